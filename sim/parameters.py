@@ -1,0 +1,180 @@
+"""The two parameter tables, sampling of sites, and the checks of user-given values.
+
+`site_parameters.csv`: the 62 parameters that differ between sites, with the range they are sampled from.
+`constants.csv`: literature constants, one value each. Both have physical limits, a unit and a source, and both
+are passed to the compiled physics at run time: changing one recompiles nothing.
+"""
+import csv
+import difflib
+import math
+from dataclasses import dataclass
+from importlib.resources import files
+from numbers import Real
+from statistics import NormalDist
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One row of a parameter table; `low == high` for a constant."""
+
+    name: str
+    low: float
+    high: float
+    physical_low: float
+    physical_high: float
+    unit: str
+    group: str
+    source: str
+    description: str
+
+
+def _read(table: str) -> dict[str, Parameter]:
+    parameters = {}
+    with (files("sim") / table).open(newline="") as rows:
+        for row in csv.DictReader(rows):
+            value = row.pop("value", None)
+            if value is not None:
+                row["low"] = row["high"] = value
+            numbers = {k: float(row[k]) for k in ("low", "high", "physical_low", "physical_high")}
+            parameters[row["name"]] = Parameter(**{**row, **numbers})
+    return parameters
+
+
+SITE_PARAMETERS = _read("site_parameters.csv")
+CONSTANTS = _read("constants.csv")
+
+#: Mechanisms that can be switched off, to run the paper's bare five nodes or to measure what each one does.
+MECHANISMS = {
+    "moss": "moss and organic layer between the surface and the mineral soil",
+    "interception": "rain and snow held, evaporated and sublimated by the canopy",
+    "soil_freezing": "latent heat and conductivity of freezing soil",
+    "crown_development": "crown growth by species and age (off: both species grow alike)",
+    "fire": "stochastic fire",
+    "insects": "stochastic insect outbreaks",
+    "snowfall_limit": "less snowfall in very cold air",
+}
+
+_LATITUDE_SOUTH, _LATITUDE_RANGE = 56.0, 9.0
+_SITE_TEMPERATURE_SPREAD_C = 0.5
+
+
+def mean_annual_temperature(latitude_deg: float, uniform: float) -> float:
+    """Mean annual temperature [degC] of a site: -5 - 5 (latitude - 56) / 9 + N(0, 0.5), kept in the sampled range.
+
+    `uniform` in [0, 1) is turned into the truncated normal deviate by its inverse distribution, so that one draw
+    is used whatever the latitude. Where the range is out of reach the nearer limit is returned.
+    """
+    parameter = SITE_PARAMETERS["mean_annual_temperature_c"]
+    centre = -5.0 - 5.0 * (latitude_deg - _LATITUDE_SOUTH) / _LATITUDE_RANGE
+    low, high = ((limit - centre) / _SITE_TEMPERATURE_SPREAD_C for limit in (parameter.low, parameter.high))
+    if low > 6.0 or high < -6.0:
+        return parameter.low if low > 6.0 else parameter.high
+    normal = NormalDist()
+    share = normal.cdf(low) + uniform * (normal.cdf(high) - normal.cdf(low))
+    deviate = normal.inv_cdf(min(max(share, 1e-12), 1.0 - 1e-12))
+    return min(max(centre + _SITE_TEMPERATURE_SPREAD_C * deviate, parameter.low), parameter.high)
+
+
+def sample_site(site_seed: int, overrides: dict | None = None) -> dict[str, float]:
+    """The 62 parameters of the site with this seed, in the order of `site_parameters.csv`.
+
+    All 62 are always drawn, so that an override (a value, or a (low, high) range to draw from) changes nothing
+    else. Raises ValueError for an unknown name or a value outside physical limits.
+    """
+    overrides = check_overrides(overrides)
+    uniforms = dict(zip(SITE_PARAMETERS, np.random.default_rng(_check_seed("site_seed", site_seed)).random(62)))
+    site = {}
+    for name, parameter in SITE_PARAMETERS.items():
+        low, high = overrides.get(name, (parameter.low, parameter.high))
+        site[name] = float(low + (high - low) * uniforms[name])
+    name = "mean_annual_temperature_c"
+    if name not in overrides:
+        site[name] = mean_annual_temperature(site["latitude_deg"], uniforms[name])
+    return site
+
+
+def middle_site(overrides: dict | None = None) -> dict[str, float]:
+    """The site in the middle of every range (mean annual temperature: that of its latitude), with overrides."""
+    overrides = check_overrides(overrides)
+    site = {}
+    for name, parameter in SITE_PARAMETERS.items():
+        low, high = overrides.get(name, (parameter.low, parameter.high))
+        site[name] = 0.5 * (low + high)
+    name = "mean_annual_temperature_c"
+    if name not in overrides:
+        site[name] = mean_annual_temperature(site["latitude_deg"], 0.5)
+    return site
+
+
+def scale_site(site: dict[str, float]) -> np.ndarray:
+    """The 62 parameters as shares of their sampled ranges: 0 at the low end, 1 at the high end. Shape (62,)."""
+    return np.array([(site[name] - p.low) / (p.high - p.low) for name, p in SITE_PARAMETERS.items()])
+
+
+def check_overrides(overrides: dict | None) -> dict[str, tuple[float, float]]:
+    """Site overrides as name -> (low, high), checked against names and physical limits."""
+    checked = {}
+    for name, value in _check_mapping("site parameters", overrides).items():
+        parameter = _lookup(SITE_PARAMETERS, "site parameter", name)
+        ends = value if isinstance(value, (tuple, list)) else (value, value)
+        if len(ends) != 2:
+            raise ValueError(f"{name}: a value or a (low, high) pair is allowed, got {value!r}")
+        low, high = (_check_number(name, end, parameter) for end in ends)
+        if low > high:
+            raise ValueError(f"{name}: range reversed, {low:g} > {high:g}")
+        checked[name] = (low, high)
+    return checked
+
+
+def check_constants(overrides: dict | None) -> dict[str, float]:
+    """All literature constants by name, with checked overrides."""
+    values = {name: parameter.low for name, parameter in CONSTANTS.items()}
+    for name, value in _check_mapping("constants", overrides).items():
+        values[name] = _check_number(name, value, _lookup(CONSTANTS, "constant", name))
+    return values
+
+
+def check_mechanisms(switches: dict | None) -> dict[str, bool]:
+    """All mechanism switches by name; those not given are on."""
+    values = dict.fromkeys(MECHANISMS, True)
+    for name, value in _check_mapping("mechanisms", switches).items():
+        _lookup(MECHANISMS, "mechanism", name)
+        if not isinstance(value, (bool, np.bool_)):
+            raise ValueError(f"mechanism {name!r}: True or False is allowed, got {value!r}")
+        values[name] = bool(value)
+    return values
+
+
+def _check_mapping(what: str, mapping) -> dict:
+    if mapping is None:
+        return {}
+    if not isinstance(mapping, dict):
+        raise ValueError(f"{what}: a dict of names and values is allowed, got {type(mapping).__name__}")
+    return mapping
+
+
+def _lookup(table: dict, kind: str, name):
+    if name in table:
+        return table[name]
+    near = difflib.get_close_matches(str(name), table, n=3)
+    hint = f"did you mean {', '.join(near)}?" if near else f"allowed: {', '.join(table)}"
+    raise ValueError(f"unknown {kind} {name!r}; {hint}")
+
+
+def _check_number(name: str, value, parameter: Parameter) -> float:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not math.isfinite(value):
+        raise ValueError(f"{name}: a finite number is allowed, got {value!r}")
+    if not parameter.physical_low <= value <= parameter.physical_high:
+        raise ValueError(
+            f"{name} = {value:g} is outside its physical limits "
+            f"[{parameter.physical_low:g}, {parameter.physical_high:g}] {parameter.unit}"
+        )
+    return float(value)
+
+
+def _check_seed(name: str, seed) -> int:
+    if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise ValueError(f"{name}: a non-negative integer is allowed, got {seed!r}")
+    return int(seed)
