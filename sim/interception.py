@@ -1,0 +1,48 @@
+"""Rain and snow held by the canopy. Stores in mm, fluxes in mm per step."""
+from sim.jit import compiled
+
+LEAST_MELTING_LOAD = 0.05  # share of capacity; the last snow melts as fast as this much, not ever more slowly
+
+
+@compiled
+def snow_capacity(temperature, plant_area, warm, cold) -> float:
+    """Snow the canopy can hold [mm]: `warm` per plant area at -1 degC and above, `cold` at -10 degC and below."""
+    share = min(max((-1.0 - temperature) / 9.0, 0.0), 1.0)
+    return plant_area * (warm + (cold - warm) * share)
+
+
+@compiled
+def intercepted(fall, store, capacity, efficiency) -> float:
+    """What stays in the canopy: the closer to capacity, the less (Hedstrom and Pomeroy 1998, Eq. 4, per step)."""
+    room = max(capacity - store, 0.0)
+    share = room / capacity if capacity > 0.0 else 0.0
+    return min(efficiency * fall * share, room)
+
+
+@compiled
+def snow_sublimation(store, capacity, exposure, net, heat_transfer, deficit, slope, psychrometric, latent_heat, seconds):
+    """Sublimation of intercepted snow [mm per step] from the exposed share of a full canopy (Penman 1948, over ice).
+
+    net : net radiation of the canopy at air temperature [W m-2]; heat_transfer : conductance to the air
+    [W m-2 K-1]; deficit, slope : of vapour pressure over ice [hPa, hPa K-1]; psychrometric : constant [hPa K-1].
+    """
+    load = min(store / capacity, 1.0) if capacity > 0.0 else 0.0
+    demand = (slope * max(net, 0.0) + heat_transfer * max(deficit, 0.0)) / (slope + psychrometric)
+    return min(exposure * load * demand / latent_heat * seconds, store)
+
+
+@compiled
+def snow_melt(store, capacity, air, air_conductance, latent_heat, seconds) -> float:
+    """Melt of intercepted snow [mm per step] by the sensible heat of air above 0 degC.
+
+    Gated on the air's temperature: gated on the canopy's own, its energy balance would have no root.
+    """
+    load = min(max(store / capacity, LEAST_MELTING_LOAD), 1.0) if capacity > 0.0 else 1.0
+    return min(load * air_conductance * max(air, 0.0) / latent_heat * seconds, store)
+
+
+@compiled
+def unloaded(store, capacity, melted, hours, per_melt, seconds) -> float:
+    """Snow that falls from the canopy [mm per step]: slowly in the cold, with melt, and all beyond capacity."""
+    creep = store * seconds / (3600.0 * hours)
+    return min(max(creep + per_melt * melted, store - capacity), store)

@@ -1,0 +1,58 @@
+"""The forester's action at the start of a year: planting and thinning.
+
+One rule, `feasible_change`, serves the transition here, the action mask and the penalty in `boreal_env`.
+"""
+import numpy as np
+
+from sim.demography import OLDEST, count, remove_share, total_weight
+from sim.jit import compiled
+
+DENSITY_CHANGES = (-100.0, -50.0, 0.0, 50.0, 100.0)  # stems ha-1
+CONIFER_MIXES = (0.0, 0.25, 0.5, 0.75, 1.0)
+NUM_ACTIONS = len(DENSITY_CHANGES) * len(CONIFER_MIXES)
+LEAST_DENSITY = 150.0  # stems ha-1 that thinning leaves
+LARGEST_DENSITY = 2000.0  # stems ha-1 that planting reaches
+NEGLIGIBLE_STEMS = 0.01  # stems ha-1; a smaller shortfall counts as done
+
+
+def decode(actions) -> tuple[np.ndarray, np.ndarray]:
+    """Density change [stems ha-1] and conifer share of integer actions, a = 5 x density index + mix index."""
+    actions = np.asarray(actions)
+    return np.take(DENSITY_CHANGES, actions // 5), np.take(CONIFER_MIXES, actions % 5)
+
+
+@compiled
+def feasible_change(change, density, harvestable) -> float:
+    """The part of a density change [stems ha-1] that can be made."""
+    if change > 0.0:
+        return min(change, max(LARGEST_DENSITY - density, 0.0))
+    return -min(-change, harvestable, max(density - LEAST_DENSITY, 0.0))
+
+
+@compiled
+def conifers_to_cut(cut, mix, conifers, deciduous, harvestable_conifers, harvestable_deciduous) -> float:
+    """Conifers among `cut` stems, so that the remaining stand comes as near as it can to the conifer share `mix`."""
+    wanted = conifers - mix * (conifers + deciduous - cut)
+    return min(max(wanted, cut - harvestable_deciduous, 0.0), cut, harvestable_conifers)
+
+
+@compiled
+def cut_oldest(stems, lane, cut, first_age, young_limit, mature_limit, rate, shape, exponent) -> float:
+    """Cut stems of one species, oldest class first, in place; returns the share of the species' carbon cut.
+
+    first_age : the youngest age that may be cut; young_limit, mature_limit : last ages of those classes.
+    """
+    whole = total_weight(stems, lane, 0, OLDEST, rate, shape, exponent)
+    removed = 0.0
+    left = cut
+    oldest = OLDEST
+    for youngest in (mature_limit + 1, young_limit + 1, first_age):
+        youngest = max(youngest, first_age)
+        available = count(stems, lane, youngest, oldest) if youngest <= oldest else 0.0
+        if left > 0.0 and available > 0.0:
+            share = min(left / available, 1.0)
+            removed += share * total_weight(stems, lane, youngest, oldest, rate, shape, exponent)
+            remove_share(stems, lane, youngest, oldest, share)
+            left -= share * available
+        oldest = youngest - 1
+    return min(removed / whole, 1.0) if whole > 0.0 else 0.0

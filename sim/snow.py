@@ -1,0 +1,61 @@
+"""Snow on the ground: albedo, insulation, exchange with the air. The snow node is the snow's surface; its whole
+depth lies between it and the soil. Without snow the node is the ground's skin of moss and litter."""
+import math
+
+from sim.canopy import VON_KARMAN
+from sim.jit import compiled
+from sim.weather import FREEZING_POINT_K
+
+ICE_HEAT_CAPACITY = 2100.0  # J kg-1 K-1
+LATENT_HEAT_FUSION = 3.34e5  # J kg-1
+LATENT_HEAT_VAPORISATION = 2.5e6  # J kg-1
+LATENT_HEAT_SUBLIMATION = LATENT_HEAT_FUSION + LATENT_HEAT_VAPORISATION
+AIR_HEAT_CAPACITY = 1005.0  # J kg-1 K-1
+GRAVITY = 9.81  # m s-2
+
+
+@compiled
+def bulk_density(cover, sheltered, exposed) -> float:
+    """Snow density [kg m-3] between a closed canopy's and the open's."""
+    return exposed + (sheltered - exposed) * cover
+
+
+@compiled
+def conductivity(density: float) -> float:
+    """Thermal conductivity of snow [W m-1 K-1] (Sturm et al. 1997, Eq. 4)."""
+    r = 0.001 * density
+    if r < 0.156:
+        return 0.023 + 0.234 * r
+    return 0.138 - 1.01 * r + 3.233 * r * r
+
+
+@compiled
+def snow_albedo(albedo, temperature, snowfall, fresh, old, cold_hours, melt_hours, refresh, seconds) -> float:
+    """Albedo after a step (FSM2): falls toward `old`, faster while melting; snowfall [mm] renews it."""
+    hours = melt_hours if temperature >= 0.0 else cold_hours
+    ageing = seconds / (3600.0 * hours)
+    renewal = snowfall / refresh
+    return (albedo + ageing * old + renewal * fresh) / (1.0 + ageing + renewal)
+
+
+@compiled
+def surface_albedo(swe, density, cover_depth, snow, ground) -> float:
+    """Albedo of the ground, with snow hiding it from `cover_depth` [m] on (FSM2)."""
+    hidden = min(swe / (density * cover_depth), 1.0)
+    return ground + (snow - ground) * hidden
+
+
+@compiled
+def exchange_velocity(wind, cover, reduction, roughness, height) -> float:
+    """Neutral conductance for heat [m s-1] between the ground and the air under the canopy, logarithmic profile."""
+    profile = math.log(height / roughness)
+    return VON_KARMAN * VON_KARMAN * wind * (1.0 - reduction * cover) / (profile * profile)
+
+
+@compiled
+def stability(surface, air, wind_below, height, damping, limit) -> float:
+    """Factor on turbulent exchange: 1 / (1 + 10 Ri) over a cold surface (FSM2), sqrt(1 - 10 Ri) over a warm one."""
+    richardson = GRAVITY * height * (air - surface) / ((air + FREEZING_POINT_K) * wind_below * wind_below)
+    stable = 1.0 / (1.0 + damping * max(richardson, 0.0))
+    unstable = min(math.sqrt(1.0 + damping * max(-richardson, 0.0)), limit)
+    return stable if richardson > 0.0 else unstable

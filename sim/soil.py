@@ -1,0 +1,121 @@
+"""Soil heat: moss and organic layer, two nodes that freeze by enthalpy, and the fixed boundary far below.
+
+Enthalpy in J m-2 with 0 at thawed soil of 0 degC. The water that freezes is a property of the column, apart from
+the bucket of `sim.water`.
+"""
+from sim.jit import compiled
+
+
+@compiled
+def temperature(enthalpy, thawed, frozen, latent, freezing_range) -> float:
+    """Temperature [degC] of a node: thawed above 0, freezing over `freezing_range` [K] below 0, then frozen.
+
+    thawed, frozen : heat capacities [J m-2 K-1]; latent : heat of the node's freezing water [J m-2].
+    """
+    bottom = -(latent + frozen * freezing_range)
+    warm = enthalpy / thawed
+    slush = enthalpy / (latent / freezing_range + frozen)
+    cold = -freezing_range + (enthalpy - bottom) / frozen
+    return warm if enthalpy >= 0.0 else (slush if enthalpy > bottom else cold)
+
+
+@compiled
+def enthalpy(node_temperature, thawed, frozen, latent, freezing_range) -> float:
+    """Inverse of `temperature`."""
+    if node_temperature >= 0.0:
+        return thawed * node_temperature
+    if node_temperature > -freezing_range:
+        return (latent / freezing_range + frozen) * node_temperature
+    return -(latent + frozen * freezing_range) + frozen * (node_temperature + freezing_range)
+
+
+@compiled
+def heat_capacity(node_temperature, thawed, frozen, latent, freezing_range) -> float:
+    """Slope of enthalpy [J m-2 K-1], freezing included."""
+    freezing = latent / freezing_range + frozen
+    return thawed if node_temperature >= 0.0 else (freezing if node_temperature > -freezing_range else frozen)
+
+
+@compiled
+def frozen_share(node_temperature, freezing_range) -> float:
+    """Share of the water that is ice."""
+    return min(max(-node_temperature / freezing_range, 0.0), 1.0)
+
+
+@compiled
+def conductivity(frozen, thawed_value, frozen_value) -> float:
+    """Conductivity [W m-1 K-1] between thawed and frozen."""
+    return thawed_value + (frozen_value - thawed_value) * frozen
+
+
+@compiled
+def organic_layer(depth, conifer, deciduous, depth_conifer, depth_deciduous, depth_open, growth, loss_years) -> float:
+    """Depth of the organic layer [m] a year later, toward the equilibrium of the canopy above it."""
+    equilibrium = conifer * depth_conifer + deciduous * depth_deciduous + (1.0 - conifer - deciduous) * depth_open
+    gap = equilibrium - depth
+    return depth + (min(gap, growth) if gap > 0.0 else gap / loss_years)
+
+
+@compiled
+def respond_to_canopy(
+    trunk, trunk_inertia, trunk_canopy, trunk_air, trunk_ground,
+    ground, ground_inertia, ground_air, ground_source, ground_emission, ground_emission_slope, vapour_slope,
+    ground_emissivity, cover, air,
+    surface, surface_inertia, ground_surface,
+    deep, deep_inertia, surface_deep, deep_boundary, boundary,
+):  # fmt: skip
+    """Answer of trunk, ground and soil to the canopy within an implicit step, from the bottom up.
+
+    Temperatures in degC at the start of the step, inertias (heat capacity / time step) and conductances in
+    W m-2 K-1. Every node's balance is linear (the ground's emission about its old temperature), so each is a line
+    in the temperature of the node above it; what remains is the canopy's own equation.
+    Returns the coefficients (deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base,
+    trunk_by_canopy, trunk_by_ground, ground_base, ground_by_emission, ground_by_canopy).
+    """
+    whole = deep_inertia + surface_deep + deep_boundary
+    deep_base = (deep_inertia * deep + deep_boundary * boundary) / whole
+    deep_by_surface = surface_deep / whole
+
+    whole = surface_inertia + ground_surface + surface_deep * (1.0 - deep_by_surface)
+    surface_base = (surface_inertia * surface + surface_deep * deep_base) / whole
+    surface_by_ground = ground_surface / whole
+
+    whole = trunk_inertia + trunk_canopy + trunk_air + trunk_ground
+    trunk_base = (trunk_inertia * trunk + trunk_air * air) / whole
+    trunk_by_canopy = trunk_canopy / whole
+    trunk_by_ground = trunk_ground / whole
+
+    whole = (
+        ground_inertia
+        + ground_emissivity * ground_emission_slope
+        + ground_air
+        + vapour_slope
+        + trunk_ground * (1.0 - trunk_by_ground)
+        + ground_surface * (1.0 - surface_by_ground)
+    )
+    ground_base = (
+        (ground_inertia + vapour_slope) * ground
+        + ground_source
+        - ground_emissivity * (ground_emission - ground_emission_slope * ground)
+        + ground_air * air
+        + trunk_ground * trunk_base
+        + ground_surface * surface_base
+    ) / whole
+    ground_by_emission = ground_emissivity * cover / whole
+    ground_by_canopy = trunk_ground * trunk_by_canopy / whole
+    return (
+        deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base, trunk_by_canopy, trunk_by_ground,
+        ground_base, ground_by_emission, ground_by_canopy,
+    )  # fmt: skip
+
+
+@compiled
+def thaw_depth(organic, surface_max, surface_thickness, heat_below, latent_per_metre, deep_thickness, freezing_range):
+    """Active-layer depth [m], from the organic surface.
+
+    The thawed share of the surface node at its warmest; once it is thawed whole, the depth below it whose ice the
+    heat that went down meanwhile could melt (Stefan). heat_below [J m-2]; latent_per_metre [J m-3].
+    """
+    thawed = (1.0 - frozen_share(surface_max, freezing_range)) * surface_thickness
+    below = min(heat_below / latent_per_metre, deep_thickness) if latent_per_metre > 0.0 else deep_thickness
+    return organic + thawed + (below if surface_max > 0.0 else 0.0)

@@ -1,0 +1,143 @@
+"""The first state of a stand: stocks and ages drawn, soil, snow and water brought into balance with the site.
+
+Soil, snow and water start near the site's means and are spun up for a few years with the stand held fixed. The
+deep soil remembers decades, so after each of them it is put where the year's heat flows would balance.
+"""
+import math
+
+import numpy as np
+
+from sim import soil
+from sim.demography import AGES, OLDEST
+from sim.jit import uncompiled
+from sim.snow import LATENT_HEAT_FUSION
+from sim.state import STATE
+from sim.weather import FREEZING_POINT_K
+
+enthalpy = uncompiled(soil.enthalpy)
+temperature = uncompiled(soil.temperature)
+
+SPIN_UP_YEARS = 3
+
+#: Ranges that the first stocks are drawn from.
+INITIAL_RANGES = {
+    "density_stems_ha": (0.0, 600.0),
+    "conifer_fraction": (0.2, 0.8),
+    "biomass_kgc_m2": (1.0, 10.0),
+    "soil_kgc_m2": (2.0, 10.0),
+    "oldest_age_years": (30.0, 110.0),
+}
+
+#: Physical limits of the first stocks.
+INITIAL_LIMITS = {
+    "density_stems_ha": (0.0, 10000.0),
+    "conifer_fraction": (0.0, 1.0),
+    "biomass_kgc_m2": (0.0, 60.0),
+    "soil_kgc_m2": (0.0, 100.0),
+    "oldest_age_years": (1.0, 200.0),
+    "hwp_kgc_m2": (0.0, 60.0),
+    "organic_layer_m": (0.0, 2.0),
+}
+
+LARGEST_STEM_KGC = 120.0
+YEARLY_SURVIVAL = 0.975
+_WATER_DENSITY = 1000.0
+_SECONDS = 365.0 * 86400.0
+
+
+def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float]:
+    """First stocks by record name, checked. Raises ValueError naming the value and what is allowed."""
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise ValueError(f"initial: a dict of names and values is allowed, got {type(values).__name__}")
+    for name, value in values.items():
+        if name not in limits:
+            raise ValueError(f"unknown initial stock {name!r}; allowed: {', '.join(limits)}")
+        low, high = limits[name]
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not low <= value <= high:
+            raise ValueError(f"initial {name} = {value!r}: a number in [{low:g}, {high:g}] is allowed")
+    return {name: float(value) for name, value in values.items()}
+
+
+def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:
+    """Ranges of first stocks, checked like `check_initial`; each a (low, high) pair."""
+    checked = {}
+    for name, pair in (ranges or {}).items():
+        if name not in INITIAL_RANGES:
+            raise ValueError(f"unknown initial range {name!r}; allowed: {', '.join(INITIAL_RANGES)}")
+        if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+            raise ValueError(f"initial range {name}: a (low, high) pair is allowed, got {pair!r}")
+        low, high = (check_initial({name: value})[name] for value in pair)
+        if low > high:
+            raise ValueError(f"initial range {name}: reversed, {low:g} > {high:g}")
+        checked[name] = (low, high)
+    return checked
+
+
+def first_state(parameters: dict, generator: np.random.Generator, given: dict | None, ranges: dict) -> np.ndarray:
+    """State vector of a stand before spin-up, shape (fields of `STATE` + ages of both species,).
+
+    parameters : all parameters by name; given : stocks by record name, in place of drawn ones. As many numbers are
+    drawn whatever is given. Stems are spread over ages 1 to the oldest, thinning out by `YEARLY_SURVIVAL` a year.
+    """
+    stocks = {name: low + (high - low) * generator.random() for name, (low, high) in ranges.items()}
+    stocks.update(given or {})
+    density, mix = stocks["density_stems_ha"], stocks["conifer_fraction"]
+    oldest = max(1, int(round(stocks["oldest_age_years"])))
+    ages = np.zeros(AGES)
+    np.add.at(ages, np.minimum(np.arange(1, oldest + 1), OLDEST), YEARLY_SURVIVAL ** np.arange(oldest))
+    ages *= density / ages.sum()
+    biomass = stocks["biomass_kgc_m2"]
+    if given is None or "biomass_kgc_m2" not in given:
+        biomass = min(biomass, density * LARGEST_STEM_KGC * 1e-4) if density > 0.0 else biomass
+
+    crowns = 1.0 - math.exp(-density * 1e-4 * parameters["crown_area_conifer_m2"])
+    organic = crowns * (
+        mix * parameters["organic_depth_conifer_m"] + (1.0 - mix) * parameters["organic_depth_deciduous_m"]
+    ) + (1.0 - crowns) * parameters["organic_depth_open_m"]
+    mean = parameters["mean_annual_temperature_c"]
+    boundary = parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K
+    winter = mean - parameters["seasonal_amplitude_c"]
+    state = dict.fromkeys(STATE, 0.0) | {
+        "conifer_biomass": mix * biomass,
+        "deciduous_biomass": (1.0 - mix) * biomass,
+        "soil_carbon": stocks["soil_kgc_m2"],
+        "products": stocks.get("hwp_kgc_m2", 0.0),
+        "organic_depth": stocks.get("organic_layer_m", organic),
+        "canopy": winter,
+        "trunk": winter,
+        "ground": min(winter, 0.0),
+        "surface_heat": enthalpy(mean - 1.0, *soil_node(parameters, "surface")),
+        "deep_heat": enthalpy(0.5 * (mean + 2.0 + boundary), *soil_node(parameters, "deep")),
+        "swe": 40.0 if winter < 0.0 else 0.0,
+        "albedo": parameters["snow_albedo_fresh"],
+        "soil_water": 0.7 * parameters["max_water_content_mm"],
+    }
+    return np.concatenate([list(state.values()), mix * ages, (1.0 - mix) * ages])
+
+
+def soil_node(parameters: dict, node: str) -> tuple[float, float, float, float]:
+    """Heat capacities thawed and frozen [J m-2 K-1], latent heat [J m-2] and freezing range [K] of a soil node."""
+    surface = parameters["surface_soil_depth_m"]
+    thickness = surface if node == "surface" else parameters["deep_soil_depth_m"] - surface
+    freezes = parameters["soil_freezing"]
+    thawed = parameters["soil_heat_capacity_thawed"]
+    frozen = thawed + freezes * (parameters["soil_heat_capacity_frozen"] - thawed)
+    latent = freezes * LATENT_HEAT_FUSION * _WATER_DENSITY * parameters["soil_freezing_water"]
+    return thawed * thickness, frozen * thickness, latent * thickness, parameters["soil_freezing_range_k"]
+
+
+def shift_deep_soil(state: np.ndarray, parameters: dict, record: dict) -> None:
+    """Put the deep soil at the temperature at which a year's heat flows would balance, in place.
+
+    Both flows are conductive, so a surplus Q [W m-2] is gone when the node is Q / (g_above + g_below) warmer.
+    """
+    index = list(STATE).index("deep_heat")
+    node = soil_node(parameters, "deep")
+    surplus = 1e6 * record["deep_heat_gain_mj_m2"] / _SECONDS
+    surface, bottom = parameters["surface_soil_depth_m"], parameters["deep_soil_depth_m"]
+    above = parameters["soil_conductivity"] / (0.5 * bottom)
+    below = parameters["soil_conductivity"] / (parameters["boundary_depth_m"] - 0.5 * (surface + bottom))
+    now = temperature(state[index], *node)
+    state[index] = enthalpy(now + surplus / (above + below), *node)

@@ -1,0 +1,364 @@
+"""Stands stepped year by year: the Python side of the simulator.
+
+Each stand's parameters, state, draws and record are rows of four arrays, (stands, fields). A year copies up to
+sixteen stands into the lanes of a block, calls the compiled kernel, and copies them back; blocks run on a pool of
+threads. So any subset of stands can be stepped together, in any order, with the same bits.
+"""
+import os
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.demography import AGE_CLASSES, AGES, SAPLING_LIMIT, SEEDLING_LIMIT
+from sim.jit import uncompiled
+from sim.management import NUM_ACTIONS, decode
+from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS, check_constants, check_mechanisms
+from sim.spin_up import INITIAL_RANGES, SPIN_UP_YEARS, first_state, shift_deep_soil
+from sim.state import DAILY, DAYS, DRAWS, RECORD, STATE, block_dtype
+from sim.year import simulate_year
+
+LANES = 16
+BACKENDS = ("numba", "python")
+
+#: Largest failure to close that a year may show: record column -> tolerance (its unit). Carbon and stems scale
+#: with the stock, whose round-off they contain.
+TOLERANCES = {
+    "energy_residual_w_m2": 1e-6,
+    "canopy_residual_w_m2": 1e-6,
+    "water_residual_mm": 1e-9,
+    "carbon_residual_kgc_m2": 1e-12,
+    "annual_carbon_residual_kgc_m2": 1e-9,
+    "stems_residual_ha": 1e-9,
+}
+
+PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS)
+STATE_NAMES = tuple(STATE)
+RECORD_NAMES = tuple(RECORD)
+STATE_SIZE = len(STATE) + 2 * AGES
+DRAWS_SIZE = sum(DAYS if daily else 1 for daily, _ in DRAWS.values())
+
+
+class Seeds(NamedTuple):
+    """Seeds of an episode's independent random streams."""
+
+    start: int
+    weather: int
+    disturbance: int
+
+
+class PhysicsError(RuntimeError):
+    """A year that failed to close or left the finite numbers, with what is needed to replay it."""
+
+
+class Stands:
+    """A number of stands, each with its own site, state and random streams.
+
+    Parameters
+    ----------
+    number : stands.
+    time_step_minutes : any divisor of a day's 1440 minutes.
+    backend : "numba", or "python" (the same source, interpreted).
+    constants : literature constants to override, name -> value (see `sim/constants.csv`).
+    mechanisms : switches, name -> bool (see `sim.parameters.MECHANISMS`).
+    hwp_half_life_years : half-life of wood products; None keeps them for ever, as the paper does.
+    harvest_min_class : youngest age class that thinning may cut: "young", "mature" or "old".
+    threads : threads for more than one block; None is one a core.
+
+    Raises ValueError for a bad argument, `PhysicsError` from `step` when a balance does not close.
+    """
+
+    def __init__(
+        self, number, *, time_step_minutes=30, backend="numba", constants=None, mechanisms=None,
+        hwp_half_life_years=None, harvest_min_class="young", threads=None,
+    ):  # fmt: skip
+        self.number = _positive_integer("number of stands", number)
+        minutes = _positive_integer("time_step_minutes", time_step_minutes)
+        if 1440 % minutes:
+            raise ValueError(f"time_step_minutes = {minutes}: a divisor of 1440 is allowed, such as 10, 15, 30, 60")
+        if backend not in BACKENDS:
+            raise ValueError(f"backend {backend!r}: allowed are {', '.join(BACKENDS)}")
+        self.steps_per_day = 1440 // minutes
+        self.backend = backend
+        self.constants = check_constants(constants)
+        self.mechanisms = check_mechanisms(mechanisms)
+        self.first_cut_age = first_cut_age(harvest_min_class, self.constants)
+        if hwp_half_life_years is not None and not hwp_half_life_years > 0.0:
+            raise ValueError(f"hwp_half_life_years = {hwp_half_life_years!r}: None or a positive number is allowed")
+        self.products_decay = 1.0 - 0.5 ** (1.0 / hwp_half_life_years) if hwp_half_life_years else 0.0
+        self.threads = threads or len(os.sched_getaffinity(0))
+        self._pool = None
+
+        self.parameters = np.zeros((self.number, len(PARAMETER_NAMES)))
+        self.state = np.zeros((self.number, STATE_SIZE))
+        self.record = np.zeros((self.number, len(RECORD)))
+        self.seeds: list[Seeds | None] = [None] * self.number
+        self.years = np.zeros(self.number, dtype=int)
+        self._weather: list = [None] * self.number
+        self._disturbance: list = [None] * self.number
+
+    def start(self, stands, sites, seeds, initial=None, initial_ranges=None, observed=None) -> None:
+        """Put stands at the beginning of an episode: draw their first state and spin it up.
+
+        stands : indices; sites : for each, its 62 parameters by name; seeds : for each, its `Seeds`;
+        initial : for each, a dict of first stocks by record name, or None; initial_ranges : ranges that the first
+        stocks are drawn from, name -> (low, high), instead of `sim.spin_up.INITIAL_RANGES`; observed : a year's
+        forcing to spin up with, instead of generated weather (a part of a year is not used).
+        """
+        stands = np.atleast_1d(np.asarray(stands, dtype=int))
+        ranges = {**INITIAL_RANGES, **(initial_ranges or {})}
+        draws = np.zeros((len(stands), SPIN_UP_YEARS, DRAWS_SIZE))
+        for k, stand in enumerate(stands):
+            site = sites[k]
+            values = {**site, **self.constants, **self.mechanisms}
+            self.parameters[stand] = [values[name] for name in PARAMETER_NAMES]
+            generator = np.random.default_rng(seeds[k].start)
+            self.state[stand] = first_state(values, generator, (initial or {}).get(k), ranges)
+            for year in range(SPIN_UP_YEARS):
+                draws[k, year] = draw_year(generator, generator)
+            self.seeds[stand] = seeds[k]
+            self.years[stand] = 0
+            self._weather[stand] = np.random.default_rng(seeds[k].weather)
+            self._disturbance[stand] = np.random.default_rng(seeds[k].disturbance)
+        whole_year = observed is not None and len(observed) == DAYS * self.steps_per_day
+        self._spin_up(stands, draws, observed if whole_year else None)
+
+    def _spin_up(self, stands, draws, observed=None) -> None:
+        """Bring soil, snow and water into balance with the site, with the stand held as it is."""
+        first = self.state[stands].copy()
+        physical = [STATE_NAMES.index(name) for name in STATE_NAMES if name not in HELD_IN_SPIN_UP]
+        calm = draws.copy()
+        calm[:, :, _draw_slice("fire_dice")] = 1.0
+        for year in range(SPIN_UP_YEARS):
+            state, record = self._run(stands, calm[:, year], np.full(len(stands), 12), observed)
+            self.state[stands] = first
+            self.state[np.ix_(stands, physical)] = state[:, physical]
+            for k, stand in enumerate(stands):
+                parameters = dict(zip(PARAMETER_NAMES, self.parameters[stand]))
+                shift_deep_soil(self.state[stand], parameters, dict(zip(RECORD_NAMES, record[k])))
+            self._check(stands, record, "spin-up")
+
+    def step(self, actions, stands=None, observed=None, days=DAYS, daily=False):
+        """Advance stands by a year under the given actions.
+
+        actions : integers in [0, 25), one a stand; stands : indices, all by default; observed : forcing
+        (days x steps a day, 6) for all stands, or None; days : fewer than 365 for a partial forcing.
+        Returns the annual record, shape (stands, columns of `RECORD_NAMES`); with `daily`, also the daily output,
+        shape (stands, days, columns of `sim.state.DAILY`).
+        """
+        stands = np.arange(self.number) if stands is None else np.atleast_1d(np.asarray(stands, dtype=int))
+        actions = check_actions(actions, len(stands))
+        draws = np.empty((len(stands), DRAWS_SIZE))
+        for k, stand in enumerate(stands):
+            if self._weather[stand] is None:
+                raise RuntimeError(f"stand {stand} has not been started")
+            draws[k] = draw_year(self._weather[stand], self._disturbance[stand])
+        rows = np.empty((len(stands), days, len(DAILY))) if daily else None
+        state, record = self._run(stands, draws, actions, observed, days, rows)
+        self._check(stands, record, "year")
+        self.state[stands] = state
+        self.record[stands] = record
+        self.years[stands] += 1
+        return (record, rows) if daily else record
+
+    def stocks(self, stands) -> dict[str, np.ndarray]:
+        """Stems and carbon of stands now, by record name, shape (stands,); `age_classes` has shape (stands, 10)."""
+        state = self.state[stands]
+        stems = state[:, len(STATE) :].reshape(len(state), 2, AGES)
+        edges = [0, SEEDLING_LIMIT + 1, SAPLING_LIMIT + 1]
+        edges += [int(self.constants["young_age_limit"]) + 1, int(self.constants["mature_age_limit"]) + 1]
+        classes = np.add.reduceat(stems, edges, axis=2).reshape(len(state), -1)
+        density = stems.sum(axis=(1, 2))
+        conifers = stems[:, 0].sum(axis=1)
+        column = {name: state[:, i] for i, name in enumerate(STATE_NAMES)}
+        return {
+            "density_stems_ha": density,
+            "conifer_fraction": np.where(density > 0.0, conifers / np.where(density > 0.0, density, 1.0), 0.0),
+            "biomass_kgc_m2": column["conifer_biomass"] + column["deciduous_biomass"],
+            "soil_kgc_m2": column["soil_carbon"].copy(),
+            "age_classes": classes,
+        }
+
+    def get_state(self) -> dict:
+        """Everything that the future depends on, as a picklable dict."""
+        return {
+            "parameters": self.parameters.copy(),
+            "state": self.state.copy(),
+            "record": self.record.copy(),
+            "years": self.years.copy(),
+            "seeds": list(self.seeds),
+            "weather": [g and g.bit_generator.state for g in self._weather],
+            "disturbance": [g and g.bit_generator.state for g in self._disturbance],
+        }
+
+    def set_state(self, state: dict) -> None:
+        """Continue from a `get_state` of as many stands."""
+        if len(state["years"]) != self.number:
+            raise ValueError(f"state of {len(state['years'])} stands given to {self.number}")
+        self.parameters, self.state = state["parameters"].copy(), state["state"].copy()
+        self.record, self.years = state["record"].copy(), state["years"].copy()
+        self.seeds = list(state["seeds"])
+        self._weather = [_generator(g) for g in state["weather"]]
+        self._disturbance = [_generator(g) for g in state["disturbance"]]
+
+    def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None):
+        """The new states and records of a year, without touching anything: (stands, fields) each."""
+        state = np.empty((len(stands), STATE_SIZE))
+        record = np.empty((len(stands), len(RECORD)))
+
+        def run(chunk):
+            rows = None if daily is None else daily[chunk]
+            state[chunk], record[chunk] = self._run_block(
+                self.parameters[stands[chunk]], self.state[stands[chunk]], draws[chunk], actions[chunk],
+                observed, days, rows,
+            )  # fmt: skip
+
+        chunks = blocks(len(stands), self.threads)
+        if len(chunks) == 1 or self.backend == "python":
+            for chunk in chunks:
+                run(chunk)
+        else:
+            if self._pool is None:
+                self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="stands")
+            list(self._pool.map(run, chunks))
+        return state, record
+
+    def _run_block(self, parameters, state, draws, actions, observed, days, daily):
+        """One call of the kernel. Lanes that are left over repeat the last stand."""
+        number = len(parameters)
+        lanes = LANES if number > 1 else 1
+        block = np.zeros(1, block_dtype(lanes))
+        rows = block.view("f8").reshape(-1, lanes)
+        fill = np.minimum(np.arange(lanes), number - 1)
+        first = 0
+        for values in (parameters, state, draws):
+            rows[first : first + values.shape[1]] = values[fill].T
+            first += values.shape[1]
+        work = block[0]["w"]
+        work["density_change"], work["mix"] = (values[fill] for values in decode(actions))
+        work["first_cut_age"] = self.first_cut_age
+        work["products_decay"] = self.products_decay
+        forcing = np.zeros((0, 6, lanes)) if observed is None else np.repeat(observed[:, :, None], lanes, axis=2)
+        output = np.zeros((0 if daily is None else days, len(DAILY), lanes))
+        if self.backend == "numba":
+            simulate_year(block[0], self.steps_per_day, days, forcing, output)
+        else:
+            with np.errstate(all="ignore"):
+                uncompiled(simulate_year)(_namespace(block[0]), self.steps_per_day, days, forcing, output)
+        if daily is not None:
+            daily[:] = output[:, :, :number].transpose(2, 0, 1)
+        first = parameters.shape[1]
+        new_state = rows[first : first + STATE_SIZE, :number].T
+        record = rows[first + STATE_SIZE + DRAWS_SIZE :][: len(RECORD), :number].T
+        return new_state, record
+
+    def _check(self, stands, record, what) -> None:
+        """Raise `PhysicsError` where a year did not close."""
+        columns = [RECORD_NAMES.index(name) for name in TOLERANCES]
+        stocks = 1.0 + record[:, RECORD_NAMES.index("density_stems_ha")]
+        limits = np.array(list(TOLERANCES.values())) * np.ones((len(stands), 1))
+        limits[:, list(TOLERANCES).index("stems_residual_ha")] *= stocks
+        failed = ~(record[:, columns] <= limits)
+        if not failed.any():
+            return
+        k, column = np.argwhere(failed)[0]
+        stand = stands[k]
+        terms = ", ".join(f"{name}={value:.6g}" for name, value in zip(RECORD_NAMES, record[k]))
+        site = ", ".join(f"{n}={v:.6g}" for n, v in zip(PARAMETER_NAMES, self.parameters[stand]))
+        raise PhysicsError(
+            f"{list(TOLERANCES)[column]} = {record[k, columns[column]]:.3g} beyond {limits[k, column]:.1g} in "
+            f"{what} {self.years[stand]} of stand {stand}, {self.seeds[stand]}; record: {terms}; site: {site}"
+        )
+
+
+#: Stocks that spin-up leaves as they were drawn.
+HELD_IN_SPIN_UP = (
+    "conifer_biomass", "deciduous_biomass", "soil_carbon", "products", "organic_depth", "drought",
+)  # fmt: skip
+
+
+def blocks(number: int, threads: int) -> list[slice]:
+    """Split stands into calls of the kernel: blocks of sixteen lanes; a few stands go one by one."""
+    if number < LANES // 2:
+        return [slice(k, k + 1) for k in range(number)]
+    return [slice(k, min(k + LANES, number)) for k in range(0, number, LANES)]
+
+
+def draw_year(weather, disturbance) -> np.ndarray:
+    """A year's random numbers in the order of `sim.state.DRAWS`: always as many, whatever the stand does."""
+    weather_names = ("temperature_noise", "wet_dice", "wet_amount")
+    values = []
+    for name, (daily, distribution) in DRAWS.items():
+        generator = weather if name in weather_names else disturbance
+        size = DAYS if daily else 1
+        if distribution == "normal":
+            values.append(generator.standard_normal(size))
+        elif distribution == "exponential":
+            values.append(generator.standard_exponential(size))
+        else:
+            values.append(generator.random(size))
+    return np.concatenate(values)
+
+
+def first_cut_age(harvest_min_class: str, constants: dict) -> int:
+    """Youngest age that thinning may cut, from the name of its age class."""
+    ages = {
+        "young": SAPLING_LIMIT + 1,
+        "mature": int(constants["young_age_limit"]) + 1,
+        "old": int(constants["mature_age_limit"]) + 1,
+    }
+    if harvest_min_class not in ages:
+        raise ValueError(f"harvest_min_class {harvest_min_class!r}: allowed are {', '.join(AGE_CLASSES[2:])}")
+    return ages[harvest_min_class]
+
+
+def check_actions(actions, number) -> np.ndarray:
+    """Actions as integers, shape (number,). Raises ValueError naming the first that is not in [0, 25)."""
+    values = np.asarray(actions)
+    if values.shape != (number,):
+        raise ValueError(f"actions of shape {values.shape}: one integer for each of {number} stands is allowed")
+    if not np.issubdtype(values.dtype, np.integer):
+        raise ValueError(f"actions of type {values.dtype}: integers in [0, {NUM_ACTIONS}) are allowed")
+    wrong = values[(values < 0) | (values >= NUM_ACTIONS)]
+    if wrong.size:
+        raise ValueError(f"action {wrong[0]}: integers in [0, {NUM_ACTIONS}) are allowed")
+    return values
+
+
+def _draw_slice(wanted: str) -> slice:
+    first = 0
+    for name, (daily, _) in DRAWS.items():
+        size = DAYS if daily else 1
+        if name == wanted:
+            return slice(first, first + size)
+        first += size
+    raise KeyError(wanted)
+
+
+def _generator(state):
+    if state is None:
+        return None
+    generator = np.random.default_rng(0)
+    generator.bit_generator.state = state
+    return generator
+
+
+def _namespace(record):
+    """A block as plain attributes, for the interpreter."""
+    return SimpleNamespace(
+        **{group: SimpleNamespace(**{n: record[group][n] for n in record[group].dtype.names}) for group in "pswrd"}
+    )
+
+
+def _positive_integer(name, value) -> int:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise ValueError(f"{name}: a positive integer is allowed, got {value!r}")
+    return int(value)
+
+
+def compile_kernels() -> None:
+    """Compile the year kernel for one and for sixteen lanes, or load both from the disk cache."""
+    for lanes in (1, LANES):
+        block = np.zeros(1, block_dtype(lanes))[0]
+        simulate_year(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes)))

@@ -1,0 +1,175 @@
+"""What a block of stands carries: one numpy record, each field an array over the block's lanes.
+
+A lane is one stand. All records nest in one, so that the compiler sees that fields do not overlap and treats
+eight lanes at a time. `block_dtype(16)` steps sixteen stands in lockstep, `block_dtype(1)` a single one, with the
+same source.
+"""
+import functools
+
+import numpy as np
+
+from sim.demography import AGES
+from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS
+
+DAYS = 365
+
+#: State that lasts from year to year: name -> (unit, meaning).
+STATE = {
+    "conifer_biomass": ("kgC m-2", "carbon of living conifers"),
+    "deciduous_biomass": ("kgC m-2", "carbon of living deciduous trees"),
+    "soil_carbon": ("kgC m-2", "carbon of litter and soil"),
+    "products": ("kgC m-2", "carbon of harvested wood products"),
+    "organic_depth": ("m", "depth of moss and organic layer"),
+    "canopy": ("degC", "canopy temperature, where Newton starts"),
+    "trunk": ("degC", "trunk temperature"),
+    "trunk_capacity": ("J m-2 K-1", "heat capacity of the trunks"),
+    "ground": ("degC", "temperature of the snow surface, or of the ground's skin"),
+    "surface_heat": ("J m-2", "enthalpy of the surface soil"),
+    "deep_heat": ("J m-2", "enthalpy of the deep soil"),
+    "swe": ("mm", "snow on the ground, as water"),
+    "albedo": ("1", "albedo of the snow"),
+    "canopy_rain": ("mm", "rain held by the canopy"),
+    "canopy_snow": ("mm", "snow held by the canopy"),
+    "soil_water": ("mm", "water in the soil bucket"),
+    "drought": ("mm", "running drought index"),
+}
+
+#: A year's random numbers: name -> (per day?, distribution).
+DRAWS = {
+    "temperature_noise": (True, "normal"),
+    "wet_dice": (True, "uniform"),
+    "wet_amount": (True, "exponential"),
+    "fire_dice": (True, "uniform"),
+    "fire_kill": (False, "uniform"),
+    "fire_depth": (False, "uniform"),
+    "insect_dice": (False, "uniform"),
+    "mortality_dice": (False, "uniform"),
+}
+
+#: The annual record: name -> (unit, meaning). Sums, means, extremes or end-of-year stocks, as the meaning says.
+RECORD = {
+    "density_stems_ha": ("stems ha-1", "stems at the year's end"),
+    "conifer_fraction": ("1", "conifers among the stems at the year's end"),
+    **{
+        f"{species}_{age}_stems_ha": ("stems ha-1", f"{species} stems of class {age} at the year's end")
+        for species in ("conifer", "deciduous")
+        for age in ("seedling", "sapling", "young", "mature", "old")
+    },
+    "biomass_kgc_m2": ("kgC m-2", "living trees at the year's end"),
+    "soil_kgc_m2": ("kgC m-2", "litter and soil at the year's end"),
+    "hwp_kgc_m2": ("kgC m-2", "stock of wood products at the year's end"),
+    "gpp_kgc_m2": ("kgC m-2", "gross primary production"),
+    "autotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of the trees"),
+    "heterotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of litter and soil"),
+    "litterfall_kgc_m2": ("kgC m-2", "litter from living trees to the soil"),
+    "mortality_kgc_m2": ("kgC m-2", "carbon of trees that died of age, crowding or insects, to the soil"),
+    "fire_mortality_kgc_m2": ("kgC m-2", "carbon of trees killed by fire and not burned, to the soil"),
+    "fire_loss_kgc_m2": ("kgC m-2", "carbon burned, trees and organic layer"),
+    "harvest_kgc_m2": ("kgC m-2", "carbon of trees cut"),
+    "harvest_emission_kgc_m2": ("kgC m-2", "part of it lost at harvest"),
+    "hwp_decay_kgc_m2": ("kgC m-2", "carbon lost by decaying products"),
+    "net_carbon_change_kgc_m2": ("kgC m-2", "change of biomass, soil and products"),
+    "precipitation_mm": ("mm", "rain and snow"),
+    "snowfall_mm": ("mm", "of which snow"),
+    "evapotranspiration_mm": ("mm", "transpiration, evaporation and sublimation"),
+    "transpiration_mm": ("mm", "of which through leaves"),
+    "runoff_mm": ("mm", "water beyond the bucket's capacity"),
+    "sublimation_mm": ("mm", "snow sublimated, canopy and ground"),
+    "canopy_sublimation_mm": ("mm", "of which from the canopy"),
+    "peak_swe_mm": ("mm", "largest snowpack of a day"),
+    "snow_off_doy": ("day of year", "day after the last snow of spring"),
+    "snow_days": ("day", "days with snow"),
+    "shortwave_mj_m2": ("MJ m-2", "incoming shortwave"),
+    "net_radiation_mj_m2": ("MJ m-2", "net radiation of the stand"),
+    "sensible_heat_mj_m2": ("MJ m-2", "sensible heat to the air"),
+    "latent_heat_mj_m2": ("MJ m-2", "latent heat to the air"),
+    "ground_shortwave_mj_m2": ("MJ m-2", "shortwave absorbed by ground and snow"),
+    "air_temperature_c": ("degC", "annual mean"),
+    "ground_temperature_c": ("degC", "annual mean of snow surface or skin"),
+    "surface_soil_temperature_c": ("degC", "annual mean"),
+    "deep_soil_temperature_c": ("degC", "annual mean"),
+    "active_layer_depth_m": ("m", "deepest thaw, from the organic surface"),
+    "boundary_warming_mj_m2": ("MJ m-2", "heat into the permafrost boundary"),
+    "boundary_cooling_mj_m2": ("MJ m-2", "heat out of it"),
+    "deep_heat_gain_mj_m2": ("MJ m-2", "heat gained by the deep soil"),
+    "growing_season_days": ("day", "days with a mean above 5 degC"),
+    "max_lai": ("m2 m-2", "largest leaf area"),
+    "summer_albedo": ("1", "June to August"),
+    "winter_albedo": ("1", "December to March"),
+    "drought_index": ("mm", "largest of the year"),
+    "organic_layer_m": ("m", "depth at the year's end"),
+    "fire_mortality": ("1", "share of stems killed by fire"),
+    "insect_mortality": ("1", "share of stems killed by insects"),
+    "planted_stems_ha": ("stems ha-1", "stems planted"),
+    "thinned_stems_ha": ("stems ha-1", "stems cut"),
+    "density_after_action": ("stems ha-1", "stems after planting and thinning"),
+    "conifer_fraction_after_action": ("1", "conifers among them"),
+    "harvestable_stems_ha": ("stems ha-1", "stems that could be cut, before the action"),
+    "biomass_change_kgc_m2": ("kgC m-2", "change of biomass"),
+    "soil_change_kgc_m2": ("kgC m-2", "change of soil carbon"),
+    "hwp_stored_kgc_m2": ("kgC m-2", "carbon added to products"),
+    "growth_heat_mj_m2": ("MJ m-2", "heat of wood that grew or went, at the trunks' temperature"),
+    "energy_residual_w_m2": ("W m-2", "largest failure of a step to close"),
+    "canopy_residual_w_m2": ("W m-2", "largest imbalance left by Newton"),
+    "water_residual_mm": ("mm", "largest failure of a step to close"),
+    "carbon_residual_kgc_m2": ("kgC m-2", "largest failure of a step to close"),
+    "annual_carbon_residual_kgc_m2": ("kgC m-2", "failure of the year to close, all fluxes"),
+    "stems_residual_ha": ("stems ha-1", "failure of the year to close"),
+}
+
+#: Columns of daily output, in order.
+DAILY = (
+    "air_temperature_c", "precipitation_mm", "gpp_kgc_m2", "autotrophic_respiration_kgc_m2",
+    "heterotrophic_respiration_kgc_m2", "shortwave_mj_m2", "net_radiation_mj_m2", "sensible_heat_mj_m2",
+    "latent_heat_mj_m2", "ground_heat_mj_m2", "boundary_heat_mj_m2", "evapotranspiration_mm", "runoff_mm", "swe_mm",
+    "canopy_snow_mm", "soil_water_mm", "canopy_temperature_c", "ground_temperature_c", "surface_soil_temperature_c",
+    "deep_soil_temperature_c", "albedo", "lai", "organic_layer_m",
+)  # fmt: skip
+
+#: Columns of an observed forcing, in order.
+FORCING = (
+    "air_temperature_c", "relative_humidity", "wind_speed_m_s", "shortwave_w_m2", "longwave_w_m2", "precipitation_mm",
+)  # fmt: skip
+
+
+#: What a step, a day or a year computes and hands on; nothing here lasts beyond the year.
+_WORK = """
+advected air air_density air_sum amplitude anomaly biomass_before boundary_before boundary_conductance
+burnt_stems canopy_air canopy_log canopy_sublimation canopy_sum canopy_sw canopy_velocity cap cos_latitude
+cos_peak cos_warmest cover_conifer cover_deciduous crown_area deep deep_base deep_by_surface deep_conductance
+deep_frozen deep_latent deep_sum deep_thawed deep_to_boundary deficit density_change diffuse dry_coefficient
+emissivity energy_before energy_gain et_before extraterrestrial first_cut_age fixed frozen_ratio gpp_before
+gpp_conifer gpp_deciduous ground_base ground_by_canopy ground_by_emission ground_conductance ground_latent
+ground_log ground_new ground_sum ground_sw ground_velocity half_deep half_surface high infiltration
+lai_conifer lai_deciduous latent_before latent_slope leaf_coefficient leaf_conifer leaf_deciduous
+light_use_conifer light_use_deciduous log_q10 longwave_cover low mean_temperature minimum_temperature mix net
+net_before optical_conifer optical_deciduous precipitation precipitation_step products_before products_decay
+ra_before rain rain_capacity reflected reflected_sum residual rh_before runoff_before saturation
+sensible_before share_conifer shortwave shortwave_sum sin_latitude sin_peak sin_warmest sky sky_conifer
+sky_deciduous slope snow snow_area snow_conductivity snow_density snow_efficiency soil_before soil_heat_sum
+stems_before stems_gain summer_down summer_up sun_a sun_b surface surface_base surface_by_ground
+surface_conductance surface_frozen surface_latent surface_max surface_sum surface_thawed sw_before
+temperature_stress_conifer temperature_stress_deciduous thaw_heat top_of_canopy transpiration_conifer
+transpiration_deciduous trial trunk_air trunk_base trunk_by_canopy trunk_by_ground trunk_canopy trunk_ground
+vapour vapour_density water_before water_gain wet_coefficient wet_limit wind_below winter_air winter_days
+winter_down winter_up
+""".split()
+
+
+@functools.cache
+def block_dtype(lanes: int) -> np.dtype:
+    """dtype of a block of stands: records `p` (parameters), `s` (state), `d` (draws), `r` (record), `w` (work)."""
+    lane, by_age, by_day = (lanes,), (AGES, lanes), (DAYS, lanes)
+    parameters = [(name, "f8", lane) for name in (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS)]
+    state = [(name, "f8", lane) for name in STATE]
+    state += [("conifer_stems", "f8", by_age), ("deciduous_stems", "f8", by_age)]
+    draws = [(name, "f8", by_day if daily else lane) for name, (daily, _) in DRAWS.items()]
+    return np.dtype(
+        [
+            ("p", parameters),
+            ("s", state),
+            ("d", draws),
+            ("r", [(name, "f8", lane) for name in RECORD]),
+            ("w", [(name, "f8", lane) for name in _WORK]),
+        ]
+    )

@@ -1,0 +1,298 @@
+"""A year of a block of stands, in the order of the paper's Annual Simulation Timeline.
+
+A pure function of parameters, state, action and the year's random draws, all in the block `b` (see `sim.state`).
+"""
+import math
+
+from sim.canopy import VON_KARMAN, aerodynamic_conductance
+from sim.day import begin_day, end_day
+from sim.demography import (
+    OLDEST,
+    SAPLING_LIMIT,
+    SEEDLING_LIMIT,
+    count,
+    grow_older,
+    recruits,
+    remove_share,
+    self_thinning,
+)
+from sim.disturbance import between, outbreak_probability
+from sim.jit import compiled, compiled_and_cached
+from sim.management import conifers_to_cut, cut_oldest, feasible_change
+from sim.snow import LATENT_HEAT_FUSION
+from sim.soil import organic_layer, thaw_depth
+from sim.step import simulate_step
+from sim.structure import crown_areas
+from sim.weather import DAYS_PER_YEAR
+
+WATER_DENSITY = 1000.0  # kg m-3
+LEAST_TRUNK_CAPACITY = 2000.0  # J m-2 K-1
+
+
+@compiled_and_cached
+def simulate_year(b, steps_per_day, days, observed, daily):
+    """Advance a block of stands by a year, in place.
+
+    b : record of `block_dtype(lanes)`, with parameters, state, the year's draws and action (`w.density_change`
+    [stems ha-1] and `w.mix`) filled in; on return its state is the new state and `b.r` the annual record.
+    steps_per_day : time steps a day; days : 365, or fewer for a partial forcing.
+    observed : observed forcing, shape (days x steps_per_day, 6, lanes) with the columns of `sim.state.FORCING`, or
+    shape (0, 6, lanes) for the weather generator.
+    daily : output, shape (days, columns, lanes) as in `sim.state.DAILY`, or (0, columns, lanes) for none.
+    """
+    begin_year(b)
+    seconds = 86400.0 / steps_per_day
+    for day in range(days):
+        today = observed[day * steps_per_day : (day + 1) * steps_per_day]
+        begin_day(b, day, today)
+        for t in range(steps_per_day):
+            angle = 2.0 * math.pi * ((t + 0.5) / steps_per_day - 0.5)
+            cos_hour = math.cos(angle)
+            lit = any_sun(b, t, cos_hour, today)
+            simulate_step(b, t, cos_hour, math.sin(angle), lit, seconds, today)
+        end_day(b, day, steps_per_day, daily)
+    end_year(b)
+
+
+@compiled
+def any_sun(b, t, cos_hour, observed):
+    """Whether the sun, or observed shortwave, reaches any lane."""
+    for i in range(len(b.s.swe)):
+        if b.w.sun_a[i] + b.w.sun_b[i] * cos_hour > 0.0:
+            return True
+        if observed.shape[0] > 0 and observed[t, 3, i] > 0.0:
+            return True
+    return False
+
+
+@compiled
+def begin_year(b):
+    """1 and 2 of the timeline: the action, and what follows from the stand's structure."""
+    for i in range(len(b.s.swe)):
+        clear_year(b, i)
+        manage(b, i)
+        site_constants(b, i)
+        crown_areas(b, i)
+        grow_trunk(b, i)
+
+
+@compiled
+def clear_year(b, i):
+    """Note the year's first stocks and clear its running sums; the record itself comes in as zeros."""
+    s, w = b.s, b.w
+    w.biomass_before[i] = s.conifer_biomass[i] + s.deciduous_biomass[i]
+    w.soil_before[i] = s.soil_carbon[i]
+    w.products_before[i] = s.products[i]
+    w.stems_before[i] = count(s.conifer_stems, i, 0, OLDEST) + count(s.deciduous_stems, i, 0, OLDEST)
+    w.stems_gain[i] = 0.0
+    w.burnt_stems[i] = 0.0
+    w.summer_up[i] = 0.0
+    w.summer_down[i] = 0.0
+    w.winter_up[i] = 0.0
+    w.winter_down[i] = 0.0
+    w.winter_air[i] = 0.0
+    w.winter_days[i] = 0.0
+    w.surface_max[i] = -100.0
+    w.thaw_heat[i] = 0.0
+
+
+@compiled
+def manage(b, i):
+    """Plant or thin: seedlings of the wanted mix; or the oldest stems, so that the stand nears the mix."""
+    s, p, w, r = b.s, b.p, b.w, b.r
+    first_age = int(w.first_cut_age[i])
+    conifers = count(s.conifer_stems, i, 0, OLDEST)
+    deciduous = count(s.deciduous_stems, i, 0, OLDEST)
+    harvestable_conifers = count(s.conifer_stems, i, first_age, OLDEST)
+    harvestable_deciduous = count(s.deciduous_stems, i, first_age, OLDEST)
+    r.harvestable_stems_ha[i] = harvestable_conifers + harvestable_deciduous
+    change = feasible_change(w.density_change[i], conifers + deciduous, r.harvestable_stems_ha[i])
+    if change > 0.0:
+        s.conifer_stems[0, i] += change * w.mix[i]
+        s.deciduous_stems[0, i] += change * (1.0 - w.mix[i])
+        r.planted_stems_ha[i] = change
+    elif change < 0.0:
+        cut = -change
+        cut_conifers = conifers_to_cut(
+            cut, w.mix[i], conifers, deciduous, harvestable_conifers, harvestable_deciduous
+        )
+        young, mature = int(p.young_age_limit[i]), int(p.mature_age_limit[i])
+        share_conifer = cut_oldest(
+            s.conifer_stems, i, cut_conifers, first_age, young, mature,
+            p.height_rate_conifer[i], p.height_shape_conifer[i], p.stem_carbon_exponent[i],
+        )  # fmt: skip
+        share_deciduous = cut_oldest(
+            s.deciduous_stems, i, cut - cut_conifers, first_age, young, mature,
+            p.height_rate_deciduous[i], p.height_shape_deciduous[i], p.stem_carbon_exponent[i],
+        )  # fmt: skip
+        harvest = share_conifer * s.conifer_biomass[i] + share_deciduous * s.deciduous_biomass[i]
+        s.conifer_biomass[i] -= share_conifer * s.conifer_biomass[i]
+        s.deciduous_biomass[i] -= share_deciduous * s.deciduous_biomass[i]
+        stored = p.harvest_stored_share[i] * harvest
+        s.products[i] += stored
+        r.thinned_stems_ha[i] = cut
+        r.harvest_kgc_m2[i] = harvest
+        r.hwp_stored_kgc_m2[i] = stored
+        r.harvest_emission_kgc_m2[i] = harvest - stored
+    w.stems_gain[i] += change
+    conifers = count(s.conifer_stems, i, 0, OLDEST)
+    density = conifers + count(s.deciduous_stems, i, 0, OLDEST)
+    r.density_after_action[i] = density
+    r.conifer_fraction_after_action[i] = conifers / density if density > 0.0 else 0.0
+    if density <= 0.0:
+        # Without stems nothing lives: what biomass there was is litter.
+        dead = s.conifer_biomass[i] + s.deciduous_biomass[i]
+        s.conifer_biomass[i] = 0.0
+        s.deciduous_biomass[i] = 0.0
+        s.soil_carbon[i] += dead
+        r.mortality_kgc_m2[i] += dead
+
+
+@compiled
+def site_constants(b, i):
+    """What the parameters fix for the year: angles, wind profiles, the soil nodes."""
+    p, w = b.p, b.w
+    latitude = math.radians(p.latitude_deg[i])
+    w.cos_latitude[i], w.sin_latitude[i] = math.cos(latitude), math.sin(latitude)
+    warmest = 2.0 * math.pi * p.warmest_day[i] / DAYS_PER_YEAR
+    w.cos_warmest[i], w.sin_warmest[i] = math.cos(warmest), math.sin(warmest)
+    peak = 2.0 * math.pi * p.peak_diurnal_hour[i] / 24.0
+    w.cos_peak[i], w.sin_peak[i] = math.cos(peak), math.sin(peak)
+    profile = math.log(p.ground_reference_height_m[i] / p.soil_roughness_m[i])
+    w.ground_log[i] = (VON_KARMAN / profile) ** 2
+    w.canopy_log[i] = aerodynamic_conductance(
+        1.0, p.canopy_roughness_m[i], p.canopy_reference_height_m[i], p.excess_resistance[i]
+    )
+    w.log_q10[i] = math.log(p.q10[i])
+
+    freezes = p.soil_freezing[i]
+    surface = p.surface_soil_depth_m[i]
+    deep = p.deep_soil_depth_m[i] - surface
+    thawed = p.soil_heat_capacity_thawed[i]
+    frozen = thawed + freezes * (p.soil_heat_capacity_frozen[i] - thawed)
+    latent = freezes * LATENT_HEAT_FUSION * WATER_DENSITY * p.soil_freezing_water[i]
+    w.surface_thawed[i], w.deep_thawed[i] = thawed * surface, thawed * deep
+    w.surface_frozen[i], w.deep_frozen[i] = frozen * surface, frozen * deep
+    w.surface_latent[i], w.deep_latent[i] = latent * surface, latent * deep
+    w.frozen_ratio[i] = 1.0 + freezes * (p.soil_frozen_conductivity_ratio[i] - 1.0)
+    w.half_surface[i] = 0.5 * surface
+    w.half_deep[i] = 0.5 * deep
+    w.deep_to_boundary[i] = p.boundary_depth_m[i] - surface - 0.5 * deep
+
+
+@compiled
+def grow_trunk(b, i):
+    """Heat capacity of the trunks; wood that grew or went takes its heat along, a named flux."""
+    s, p, w, r = b.s, b.p, b.w, b.r
+    biomass = s.conifer_biomass[i] + s.deciduous_biomass[i]
+    capacity = LEAST_TRUNK_CAPACITY + p.trunk_heat_per_carbon[i] * biomass
+    r.growth_heat_mj_m2[i] = 1e-6 * (capacity - s.trunk_capacity[i]) * s.trunk[i]
+    s.trunk_capacity[i] = capacity
+
+
+@compiled
+def end_year(b):
+    """4 of the timeline: insects, mortality, recruitment, ageing, the organic layer, products, the account."""
+    for i in range(len(b.s.swe)):
+        renew_stems(b, i)
+        decay(b, i)
+        write_record(b, i)
+
+
+@compiled
+def renew_stems(b, i):
+    """Insects, background mortality and self-thinning, recruitment, ageing."""
+    s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
+    fire_killed = w.burnt_stems[i]
+    conifers = count(s.conifer_stems, i, 0, OLDEST)
+    deciduous = count(s.deciduous_stems, i, 0, OLDEST)
+    density = conifers + deciduous
+
+    winter = w.winter_air[i] / w.winter_days[i] if w.winter_days[i] > 0.0 else 0.0
+    outbreak = p.insects[i] > 0.0 and d.insect_dice[i] < outbreak_probability(
+        p.insect_base_probability[i], winter, density, p.insect_lethal_c[i], p.insect_mild_c[i], p.insect_density[i]
+    )
+    insects = p.insect_mortality_rate[i] if outbreak else 0.0
+    background = p.natural_mortality[i] * between(
+        1.0 - p.mortality_spread[i], 1.0 + p.mortality_spread[i], d.mortality_dice[i]
+    )
+    crowding = self_thinning(
+        density, p.max_natural_density[i], p.density_mortality_threshold[i], p.density_dependent_mortality[i]
+    )
+    dies_conifer = min(insects + background * p.mortality_conifer[i] + crowding, 1.0)
+    dies_deciduous = min(
+        insects * p.insect_deciduous[i] + background * p.mortality_deciduous[i] + crowding, 1.0
+    )  # fmt: skip
+    remove_share(s.conifer_stems, i, 0, OLDEST, dies_conifer)
+    remove_share(s.deciduous_stems, i, 0, OLDEST, dies_deciduous)
+    dead_conifer = dies_conifer * s.conifer_biomass[i]
+    dead_deciduous = dies_deciduous * s.deciduous_biomass[i]
+    s.conifer_biomass[i] -= dead_conifer
+    s.deciduous_biomass[i] -= dead_deciduous
+    s.soil_carbon[i] += dead_conifer + dead_deciduous
+    r.mortality_kgc_m2[i] += dead_conifer + dead_deciduous
+    killed = insects * (conifers + p.insect_deciduous[i] * deciduous)
+    r.insect_mortality[i] = killed / density if density > 0.0 else 0.0
+
+    new = recruits(density, p.max_natural_density[i], p.recruitment_rate[i])
+    seed_source = conifers / density if density > 0.0 else 0.5
+    s.conifer_stems[0, i] += new * seed_source
+    s.deciduous_stems[0, i] += new * (1.0 - seed_source)
+    w.stems_gain[i] += new - dies_conifer * conifers - dies_deciduous * deciduous - fire_killed
+    grow_older(s.conifer_stems, i)
+    grow_older(s.deciduous_stems, i)
+
+
+@compiled
+def decay(b, i):
+    """The organic layer moves toward its canopy's equilibrium; products decay if they have a half-life."""
+    s, p, w, r = b.s, b.p, b.w, b.r
+    s.organic_depth[i] = organic_layer(
+        s.organic_depth[i], w.cover_conifer[i], w.cover_deciduous[i], p.organic_depth_conifer_m[i],
+        p.organic_depth_deciduous_m[i], p.organic_depth_open_m[i], p.organic_growth_m_yr[i], p.organic_loss_years[i],
+    )  # fmt: skip
+    lost = s.products[i] * w.products_decay[i]
+    s.products[i] -= lost
+    r.hwp_decay_kgc_m2[i] = lost
+
+
+@compiled
+def write_record(b, i):
+    """5 of the timeline: stocks at the year's end, means, and what the year failed to close."""
+    s, p, w, r = b.s, b.p, b.w, b.r
+    young, mature = int(p.young_age_limit[i]), int(p.mature_age_limit[i])
+    conifers = count(s.conifer_stems, i, 0, OLDEST)
+    density = conifers + count(s.deciduous_stems, i, 0, OLDEST)
+    r.density_stems_ha[i] = density
+    r.conifer_fraction[i] = conifers / density if density > 0.0 else 0.0
+    r.conifer_seedling_stems_ha[i] = count(s.conifer_stems, i, 0, SEEDLING_LIMIT)
+    r.conifer_sapling_stems_ha[i] = count(s.conifer_stems, i, SEEDLING_LIMIT + 1, SAPLING_LIMIT)
+    r.conifer_young_stems_ha[i] = count(s.conifer_stems, i, SAPLING_LIMIT + 1, young)
+    r.conifer_mature_stems_ha[i] = count(s.conifer_stems, i, young + 1, mature)
+    r.conifer_old_stems_ha[i] = count(s.conifer_stems, i, mature + 1, OLDEST)
+    r.deciduous_seedling_stems_ha[i] = count(s.deciduous_stems, i, 0, SEEDLING_LIMIT)
+    r.deciduous_sapling_stems_ha[i] = count(s.deciduous_stems, i, SEEDLING_LIMIT + 1, SAPLING_LIMIT)
+    r.deciduous_young_stems_ha[i] = count(s.deciduous_stems, i, SAPLING_LIMIT + 1, young)
+    r.deciduous_mature_stems_ha[i] = count(s.deciduous_stems, i, young + 1, mature)
+    r.deciduous_old_stems_ha[i] = count(s.deciduous_stems, i, mature + 1, OLDEST)
+
+    r.biomass_kgc_m2[i] = s.conifer_biomass[i] + s.deciduous_biomass[i]
+    r.soil_kgc_m2[i] = s.soil_carbon[i]
+    r.hwp_kgc_m2[i] = s.products[i]
+    r.biomass_change_kgc_m2[i] = r.biomass_kgc_m2[i] - w.biomass_before[i]
+    r.soil_change_kgc_m2[i] = r.soil_kgc_m2[i] - w.soil_before[i]
+    products_change = s.products[i] - w.products_before[i]
+    r.net_carbon_change_kgc_m2[i] = r.biomass_change_kgc_m2[i] + r.soil_change_kgc_m2[i] + products_change
+    crossed = (
+        r.gpp_kgc_m2[i] - r.autotrophic_respiration_kgc_m2[i] - r.heterotrophic_respiration_kgc_m2[i]
+        - r.fire_loss_kgc_m2[i] - r.harvest_emission_kgc_m2[i] - r.hwp_decay_kgc_m2[i]
+    )  # fmt: skip
+    r.annual_carbon_residual_kgc_m2[i] = abs(r.net_carbon_change_kgc_m2[i] - crossed)
+    r.stems_residual_ha[i] = abs(density - w.stems_before[i] - w.stems_gain[i])
+    r.summer_albedo[i] = w.summer_up[i] / w.summer_down[i] if w.summer_down[i] > 0.0 else math.nan
+    r.winter_albedo[i] = w.winter_up[i] / w.winter_down[i] if w.winter_down[i] > 0.0 else math.nan
+    r.organic_layer_m[i] = s.organic_depth[i]
+    r.active_layer_depth_m[i] = thaw_depth(
+        s.organic_depth[i] * p.moss[i], w.surface_max[i], p.surface_soil_depth_m[i], w.thaw_heat[i],
+        w.surface_latent[i] / p.surface_soil_depth_m[i], 2.0 * w.half_deep[i], p.soil_freezing_range_k[i],
+    )  # fmt: skip
