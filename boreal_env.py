@@ -1,0 +1,730 @@
+"""BoreaRL: managing a boreal stand for carbon and for permafrost, as a mo-gymnasium environment.
+
+`import boreal_env` registers `boreal-generalist-v0`, `boreal-site-specific-v0` and `boreal-balanced-v0`.
+The file reads top to bottom: observation, action mask, reward, episodes, the environment, the vector environment.
+"""
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields, replace
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.spaces import Box, Discrete
+from gymnasium.utils import EzPickle
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+import sim
+from sim.management import CONIFER_MIXES, DENSITY_CHANGES, LARGEST_DENSITY, LEAST_DENSITY, NEGLIGIBLE_STEMS, NUM_ACTIONS
+from sim.spin_up import check_initial, check_initial_ranges
+from sim.stands import check_actions, compile_kernels, first_cut_age
+
+MODES = ("generalist", "site_specific")
+THAW_FORMULATIONS = ("asymmetric", "contrast", "raw_degree_days")
+NO_CHANGE = 12  # the action that neither plants nor thins
+AGE_CLASSES = ("seedling", "sapling", "young", "mature", "old")
+DEFAULT_YEARS = 50
+
+# ---------------------------------------------------------------------------------------------------------------
+# Observation: index for index the paper's detailed table
+# ---------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Observed:
+    """One entry of the observation: (value + shift) / scale, with the physical limits of the value."""
+
+    name: str
+    group: str
+    unit: str
+    shift: float
+    scale: float
+    low: float
+    high: float
+
+
+_STOCK, _CHANGE = 200.0, 100.0  # kgC m-2, beyond what a boreal stand can hold or move in a year
+
+
+def _site_limits(name):
+    return sim.SITE_PARAMETERS[name].physical_low, sim.SITE_PARAMETERS[name].physical_high
+
+
+def _observation_table() -> tuple[Observed, ...]:
+    latitude, mean, amplitude = (
+        _site_limits(n) for n in ("latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c")
+    )
+    start, fall = _site_limits("growth_start_day"), _site_limits("fall_start_day")
+    table = [
+        Observed("preference", "preference", "1", 0, 1, 0, 1),
+        Observed("year", "state", "yr", 0, 50, 0, 1000),
+        Observed("density", "state", "stems ha-1", 0, 1500, 0, 15000),
+        Observed("conifer_fraction", "state", "1", 0, 1, 0, 1),
+        Observed("carbon_stock", "state", "kgC m-2", 0, 50, 0, 2 * _STOCK),
+        Observed("latitude", "climate", "degN", -50, 20, *latitude),
+        Observed("mean_annual_temperature", "climate", "degC", 10, 20, *mean),
+        Observed("seasonal_amplitude", "climate", "degC", 0, 30, *amplitude),
+        Observed("growth_start_day", "climate", "day of year", 0, 365, *start),
+        Observed("fall_start_day", "climate", "day of year", 0, 365, *fall),
+        Observed("growing_season_length", "climate", "day", 0, 200, fall[0] - start[1], fall[1] - start[0]),
+    ]
+    for name, unit, scale, high in (("fire_mortality", "1", 1, 1), ("insect_mortality", "1", 1, 1),
+                                    ("drought_index", "mm", 100, 1e4)):  # fmt: skip
+        table += [Observed(f"{name}_{ago}", "disturbance", unit, 0, scale, 0, high) for ago in ("1yr", "2yr")]
+    table += [
+        Observed("biomass_change", "carbon", "kgC m-2", 0.5, 1.0, -_CHANGE, _CHANGE),
+        Observed("soil_change", "carbon", "kgC m-2", 0.2, 0.4, -_CHANGE, _CHANGE),
+        Observed("total_change", "carbon", "kgC m-2", 0.7, 1.4, -_CHANGE, _CHANGE),
+        Observed("natural_mortality", "carbon", "kgC m-2", 0, 0.5, 0, _CHANGE),
+        Observed("litterfall", "carbon", "kgC m-2", 0, 2.0, 0, _CHANGE),
+        Observed("thinning_loss", "carbon", "kgC m-2", 0.5, 1.0, 0, _CHANGE),
+        Observed("products_stored", "carbon", "kgC m-2", 0, 0.5, 0, _CHANGE),
+        Observed("density_action", "management", "index", 0, 4, 0, 4),
+        Observed("mix_action", "management", "index", 0, 4, 0, 4),
+        Observed("density_change", "management", "stems ha-1", 100, 200, -100, 100),
+        Observed("mix_change", "management", "1", 0, 1, -1, 1),
+    ]
+    table += [
+        Observed(f"{species}_{age}", "age", "1", 0, 1, 0, 1)
+        for species in ("conifer", "deciduous")
+        for age in AGE_CLASSES
+    ]
+    table += [
+        Observed("biomass", "stocks", "kgC m-2", 0, 50, 0, _STOCK),
+        Observed("soil", "stocks", "kgC m-2", 0, 50, 0, _STOCK),
+        Observed("biomass_limit_penalty", "penalties", "1", 0, 0.5, 0, 100),
+        Observed("soil_limit_penalty", "penalties", "1", 0, 0.5, 0, 100),
+        Observed("density_penalty", "penalties", "1", 0, 1.0, 0, 100),
+    ]
+    for name, p in sim.SITE_PARAMETERS.items():
+        table.append(
+            Observed(f"site_{name}", "site", p.unit, -p.low, p.high - p.low, p.physical_low, p.physical_high)
+        )
+    return tuple(table)
+
+
+OBSERVATION = _observation_table()
+OBSERVATION_NAMES = tuple(entry.name for entry in OBSERVATION)
+OBSERVATION_GROUPS = tuple(dict.fromkeys(entry.group for entry in OBSERVATION))
+_SHIFT = np.array([entry.shift for entry in OBSERVATION])
+_SCALE = np.array([entry.scale for entry in OBSERVATION])
+_AGE = slice(OBSERVATION_NAMES.index("conifer_seedling"), OBSERVATION_NAMES.index("deciduous_old") + 1)
+_SITE = slice(OBSERVATION_NAMES.index(f"site_{next(iter(sim.SITE_PARAMETERS))}"), len(OBSERVATION))
+_COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
+
+
+def observation_space(entries: Sequence[int]) -> Box:
+    """Box of the given entries of the table, with bounds from physical limits, widened for float32 rounding."""
+    low = np.array([(OBSERVATION[i].low + OBSERVATION[i].shift) / OBSERVATION[i].scale for i in entries])
+    high = np.array([(OBSERVATION[i].high + OBSERVATION[i].shift) / OBSERVATION[i].scale for i in entries])
+    margin = 1e-4 * (high - low)
+    return Box((low - margin).astype(np.float32), (high + margin).astype(np.float32), dtype=np.float32)
+
+
+def sample_site_observations(site_seeds: Sequence[int]) -> np.ndarray:
+    """The 62 site entries of the observation for sites with these seeds, shape (n, 62), float32."""
+    return np.array([sim.scale_site(sim.sample_site(seed)) for seed in site_seeds], dtype=np.float32)
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# Action: 5 x density index + mix index
+# ---------------------------------------------------------------------------------------------------------------
+
+
+def action_masks(observations: np.ndarray, harvest_min_class: str = "young") -> np.ndarray:
+    """Valid actions of observations: those whose whole density change can be made, and so cost no penalty.
+
+    observations : (n, 43 or more), as the environment gives them; harvest_min_class : "young", "mature" or "old".
+    Returns bool, shape (n, 25).
+    """
+    first_cut_age(harvest_min_class, {"young_age_limit": 40, "mature_age_limit": 100})
+    observations = np.atleast_2d(observations).astype(float)
+    density = observations[:, 2] * 1500.0
+    fractions = observations[:, _AGE].reshape(-1, 2, len(AGE_CLASSES))
+    harvestable = density * fractions[:, :, AGE_CLASSES.index(harvest_min_class) :].sum(axis=(1, 2))
+    changes = np.array(DENSITY_CHANGES)
+    small = 0.5 * NEGLIGIBLE_STEMS
+    planting = density[:, None] + changes < LARGEST_DENSITY - small
+    cuttable = np.minimum(harvestable, density - LEAST_DENSITY)[:, None]
+    valid = np.where(changes > 0.0, planting, -changes <= cuttable + small) | (changes == 0.0)
+    return np.repeat(valid, len(CONIFER_MIXES), axis=1)
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# Reward: [carbon, thaw]
+# ---------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Reward:
+    """Constants of the reward; the defaults are the paper's."""
+
+    carbon_scale: float = 2.0  # kgC m-2 yr-1
+    stock_bonus: float = 0.0
+    stock_scale: float = 50.0  # kgC m-2
+    product_bonus: float = 0.0
+    product_scale: float = 1.0  # kgC m-2
+    biomass_limit: float = 15.0  # kgC m-2
+    soil_limit: float = 20.0  # kgC m-2
+    limit_penalty: float = 0.5
+    density_limit: float = 2000.0  # stems ha-1
+    density_penalty: float = 1.0
+    ineffective_penalty: float = 0.5
+    thaw_scale: float = 40.0  # MJ m-2 yr-1
+    warming_weight: float = 2.5
+
+    def __post_init__(self):
+        for field in fields(self):
+            value = getattr(self, field.name)
+            positive = field.name.endswith(("scale", "limit"))
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+                raise ValueError(f"reward {field.name}: a finite number is allowed, got {value!r}")
+            if value < 0.0 or (positive and value == 0.0):
+                raise ValueError(f"reward {field.name} = {value}: a {'positive' if positive else 'non-negative'} number")
+
+    @staticmethod
+    def of(values) -> "Reward":
+        """A Reward from a Reward, a dict of constants to change, or None."""
+        if values is None or isinstance(values, Reward):
+            return values or Reward()
+        if not isinstance(values, dict):
+            raise ValueError(f"reward: a Reward or a dict of its constants is allowed, got {type(values).__name__}")
+        allowed = [field.name for field in fields(Reward)]
+        unknown = [name for name in values if name not in allowed]
+        if unknown:
+            raise ValueError(f"unknown reward constant {unknown[0]!r}; allowed: {', '.join(allowed)}")
+        return replace(Reward(), **values)
+
+
+def reward_components(record: np.ndarray, density_change: np.ndarray, reward: Reward) -> dict[str, np.ndarray]:
+    """Parts of the carbon reward of a year, each shape (n,); see `carbon_reward`.
+
+    record : annual records (n, columns of `sim.RECORD_NAMES`); density_change : what was asked for [stems ha-1].
+    """
+    column = {name: record[:, i] for name, i in _COLUMN.items()}
+    stock = column["biomass_kgc_m2"] + column["soil_kgc_m2"]
+    over_biomass = np.maximum(column["biomass_kgc_m2"] - reward.biomass_limit, 0.0)
+    over_soil = np.maximum(column["soil_kgc_m2"] - reward.soil_limit, 0.0)
+    made = column["planted_stems_ha"] - column["thinned_stems_ha"]
+    shortfall = np.abs(density_change - made)
+    missed = np.where(shortfall < NEGLIGIBLE_STEMS, 0.0, shortfall / np.maximum(np.abs(density_change), 1.0))
+    return {
+        "carbon_change": np.clip(column["net_carbon_change_kgc_m2"] / reward.carbon_scale, -1.0, 1.0),
+        "stock_bonus": reward.stock_bonus * np.clip(stock / reward.stock_scale, 0.0, 1.0),
+        "product_bonus": reward.product_bonus * np.clip(column["hwp_stored_kgc_m2"] / reward.product_scale, 0.0, 1.0),
+        "biomass_limit_penalty": reward.limit_penalty * over_biomass / reward.biomass_limit,
+        "soil_limit_penalty": reward.limit_penalty * over_soil / reward.soil_limit,
+        "density_penalty": reward.density_penalty * (column["density_after_action"] >= reward.density_limit),
+        "ineffective_penalty": reward.ineffective_penalty * missed,
+    }
+
+
+def carbon_reward(components: dict[str, np.ndarray]) -> np.ndarray:
+    """Carbon reward before its final clip to [-1, 1]: change and bonuses less penalties."""
+    c = components
+    gains = c["carbon_change"] + c["stock_bonus"] + c["product_bonus"]
+    limits = c["biomass_limit_penalty"] + c["soil_limit_penalty"]
+    return gains - limits - c["density_penalty"] - c["ineffective_penalty"]
+
+
+def thaw_reward(cooling: np.ndarray, warming: np.ndarray, reward: Reward, formulation: str) -> np.ndarray:
+    """Thaw reward before its final clip, from heat out of and into the boundary [MJ m-2 yr-1]."""
+    if formulation == "contrast":
+        both = cooling + warming
+        return np.where(both > 0.0, (cooling - warming) / np.where(both > 0.0, both, 1.0), 0.0)
+    weight = reward.warming_weight if formulation == "asymmetric" else 1.0
+    return (cooling - weight * warming) / reward.thaw_scale
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# Episodes: what one environment and many in lockstep share
+# ---------------------------------------------------------------------------------------------------------------
+
+#: Columns that the environment adds to the annual record.
+REWARD_COLUMNS = (
+    "carbon_change", "stock_bonus", "product_bonus", "biomass_limit_penalty", "soil_limit_penalty", "density_penalty",
+    "ineffective_penalty", "carbon_clipped", "thaw_clipped", "carbon_reward", "thaw_reward",
+)  # fmt: skip
+HISTORY_NAMES = (*sim.RECORD_NAMES, *REWARD_COLUMNS)
+_HISTORY = {name: i for i, name in enumerate(HISTORY_NAMES)}
+
+
+class _Episodes:
+    """`number` episodes side by side. Arguments are those of `BorealEnv`, checked here."""
+
+    def __init__(
+        self, number, *, mode="generalist", years=DEFAULT_YEARS, time_step_minutes=30, backend="numba",
+        thaw_formulation="asymmetric", fixed_preference=None, site_seed=None, parameter_overrides=None,
+        initial_ranges=None, hwp_half_life_years=None, harvest_min_class="young", reward=None, mechanisms=None,
+        constants=None, observation_groups=None, record_years=False,
+    ):  # fmt: skip
+        _check_choice("mode", mode, MODES)
+        _check_choice("thaw_formulation", thaw_formulation, THAW_FORMULATIONS)
+        if isinstance(years, bool) or not isinstance(years, (int, np.integer)) or not 1 <= years <= 1000:
+            raise ValueError(f"years: an integer in [1, 1000] is allowed, got {years!r}")
+        if fixed_preference is not None:
+            fixed_preference = check_preference(fixed_preference)
+        if site_seed is not None:
+            sim.sample_site(site_seed)
+        if not isinstance(record_years, (bool, np.bool_)):
+            raise ValueError(f"record_years: True or False is allowed, got {record_years!r}")
+        self.number, self.mode, self.years = number, mode, int(years)
+        self.thaw_formulation, self.fixed_preference = thaw_formulation, fixed_preference
+        self.site_seed, self.parameter_overrides = site_seed, dict(parameter_overrides or {})
+        sim.middle_site(parameter_overrides)
+        self.initial_ranges = check_initial_ranges(initial_ranges)
+        self.harvest_min_class = harvest_min_class
+        self.reward = Reward.of(reward)
+        self.record_years = bool(record_years)
+        self.stands = sim.Stands(
+            number, time_step_minutes=time_step_minutes, backend=backend, constants=constants, mechanisms=mechanisms,
+            hwp_half_life_years=hwp_half_life_years, harvest_min_class=harvest_min_class,
+        )  # fmt: skip
+        groups = OBSERVATION_GROUPS if observation_groups is None else tuple(observation_groups)
+        for group in groups:
+            _check_choice("observation group", group, OBSERVATION_GROUPS)
+        if mode == "site_specific":
+            groups = tuple(group for group in groups if group != "site")
+        self.entries = [i for i, entry in enumerate(OBSERVATION) if entry.group in groups]
+        self.preference = np.zeros(number)
+        self.site_seeds = np.zeros(number, dtype=np.int64)
+        self.episode_seeds = np.zeros(number, dtype=np.int64)
+        self.year = np.zeros(number, dtype=int)
+        self.running = np.zeros(number, dtype=bool)
+        self.history = np.zeros((number, self.years, len(HISTORY_NAMES)))
+        self._observation = np.zeros((number, len(OBSERVATION)))
+
+    def draw(self, generator: np.random.Generator) -> tuple[int, int, float]:
+        """Site seed, episode seed and preference of an episode: always three draws."""
+        return int(generator.integers(2**31)), int(generator.integers(2**62)), float(generator.random())
+
+    def begin(self, indices, draws, preferences, sites) -> None:
+        """Start episodes. draws : for each, `draw`'s result; preferences, sites : for each, given values or None."""
+        chosen, seeds, given = [], [], {}
+        for k, i in enumerate(indices):
+            site_seed, episode_seed, preference = draws[k]
+            overrides = {**self.parameter_overrides, **(sites[k] or {})}
+            if self.mode == "site_specific":
+                # A fixed world: one site, one start, one weather, one set of disturbance dice.
+                overrides.setdefault("daily_noise_std_c", 0.0)
+                episode_seed = 0 if self.site_seed is None else self.site_seed
+                given[k] = {n: 0.5 * (a + b) for n, (a, b) in {**sim.INITIAL_RANGES, **self.initial_ranges}.items()}
+            if self.site_seed is not None:
+                site_seed = self.site_seed
+            fixed_middle = self.mode == "site_specific" and self.site_seed is None
+            chosen.append(sim.middle_site(overrides) if fixed_middle else sim.sample_site(site_seed, overrides))
+            seeds.append(sim.episode_seeds(episode_seed))
+            self.site_seeds[i] = -1 if fixed_middle else site_seed
+            self.episode_seeds[i] = episode_seed
+            wanted = self.fixed_preference if preferences[k] is None else preferences[k]
+            self.preference[i] = preference if wanted is None else wanted
+        self.stands.start(indices, chosen, seeds, given, self.initial_ranges)
+        self.year[indices] = 0
+        self.running[indices] = True
+        self.history[indices] = 0.0
+        self._observe_start(np.asarray(indices), chosen)
+
+    def advance(self, actions) -> np.ndarray:
+        """A year for all episodes; returns float32 rewards (number, 2)."""
+        if not self.running.all():
+            stopped = int(np.argmin(self.running))
+            raise RuntimeError(f"step on episode {stopped} that is not running: call reset first")
+        actions = check_actions(actions, self.number)
+        before = self.conifer_fraction()
+        record = self.stands.step(actions)
+        change = np.take(DENSITY_CHANGES, actions // 5)
+        components = reward_components(record, change, self.reward)
+        carbon = carbon_reward(components)
+        cooling, warming = (record[:, _COLUMN[f"boundary_{way}_mj_m2"]] for way in ("cooling", "warming"))
+        thaw = thaw_reward(cooling, warming, self.reward, self.thaw_formulation)
+        rewards = np.clip(np.stack([carbon, thaw], axis=1), -1.0, 1.0)
+        parts = {
+            **components,
+            "carbon_clipped": carbon - rewards[:, 0],
+            "thaw_clipped": thaw - rewards[:, 1],
+            "carbon_reward": rewards[:, 0],
+            "thaw_reward": rewards[:, 1],
+        }
+        year = self.year
+        self.history[np.arange(self.number), year] = np.column_stack([record, *(parts[n] for n in REWARD_COLUMNS)])
+        self.year = year + 1
+        self.running = self.year < self.years
+        self._observe_year(record, actions, before, components)
+        return rewards.astype(np.float32)
+
+    def observations(self) -> np.ndarray:
+        """Fresh float32 observations, shape (number, entries)."""
+        self._observation[:, 0] = self.preference
+        return self._observation[:, self.entries].astype(np.float32)
+
+    def conifer_fraction(self) -> np.ndarray:
+        """Conifers among the stems now, shape (number,)."""
+        return self._observation[:, 3].copy()
+
+    def final_info(self, i: int) -> dict:
+        """Totals of a finished episode."""
+        years = self.history[i, : self.year[i]]
+
+        def mean(name):
+            return float(years[:, _HISTORY[name]].mean())
+
+        info = {
+            "carbon_return": float(years[:, _HISTORY["carbon_reward"]].sum()),
+            "thaw_return": float(years[:, _HISTORY["thaw_reward"]].sum()),
+            "site_seed": int(self.site_seeds[i]),
+            "episode_seed": int(self.episode_seeds[i]),
+            "preference": float(self.preference[i]),
+            "final_density": float(years[-1, _HISTORY["density_stems_ha"]]),
+            "mean_density": mean("density_stems_ha"),
+            "final_conifer_fraction": float(years[-1, _HISTORY["conifer_fraction"]]),
+            "mean_conifer_fraction": mean("conifer_fraction"),
+            "growing_season_days": mean("growing_season_days"),
+            "latent_heat_mj_m2": mean("latent_heat_mj_m2"),
+            "ground_shortwave_mj_m2": mean("ground_shortwave_mj_m2"),
+        }
+        if self.record_years:
+            info["years"] = {name: years[:, k].copy() for name, k in _HISTORY.items()}
+        return info
+
+    def _observe_start(self, indices, sites) -> None:
+        """Observation of a fresh stand: history of an unchanged one."""
+        for i, site in zip(indices, sites):
+            row = self._observation[i]
+            row[:] = 0.0
+            row[5:8] = [site[n] for n in ("latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c")]
+            row[8], row[9] = site["growth_start_day"], site["fall_start_day"]
+            row[10] = row[9] - row[8]
+            row[24] = DENSITY_CHANGES.index(0.0)
+            row[5:11] = (row[5:11] + _SHIFT[5:11]) / _SCALE[5:11]
+            row[_SITE] = sim.scale_site(site)
+        stocks = self.stands.stocks(indices)
+        values = np.zeros((len(indices), len(OBSERVATION)))
+        values[:, 24] = DENSITY_CHANGES.index(0.0)
+        values[:, 25] = np.abs(stocks["conifer_fraction"][:, None] - np.array(CONIFER_MIXES)).argmin(axis=1)
+        self._fill_stand(values, stocks)
+        rows = self._observation[indices]
+        rows[:, :5] = (values[:, :5] + _SHIFT[:5]) / _SCALE[:5]
+        rows[:, 11 : _SITE.start] = (values[:, 11 : _SITE.start] + _SHIFT[11 : _SITE.start]) / _SCALE[11 : _SITE.start]
+        self._observation[indices] = rows
+
+    def _observe_year(self, record, actions, conifers_before, components) -> None:
+        """Observation after a year; what was last year's becomes the year before's."""
+        column = {name: record[:, i] for name, i in _COLUMN.items()}
+        older = self._observation[:, [11, 13, 15]].copy()
+        values = np.zeros((self.number, len(OBSERVATION)))
+        values[:, 1] = self.year
+        values[:, 11], values[:, 13] = column["fire_mortality"], column["insect_mortality"]
+        values[:, 15] = column["drought_index"]
+        values[:, 17] = column["biomass_change_kgc_m2"]
+        values[:, 18] = column["soil_change_kgc_m2"]
+        values[:, 19] = column["net_carbon_change_kgc_m2"]
+        values[:, 20] = column["mortality_kgc_m2"]
+        values[:, 21] = column["litterfall_kgc_m2"]
+        values[:, 22] = column["harvest_kgc_m2"]
+        values[:, 23] = column["hwp_stored_kgc_m2"]
+        values[:, 24], values[:, 25] = actions // 5, actions % 5
+        values[:, 26] = column["planted_stems_ha"] - column["thinned_stems_ha"]
+        values[:, 27] = column["conifer_fraction_after_action"] - conifers_before
+        values[:, 40] = components["biomass_limit_penalty"]
+        values[:, 41] = components["soil_limit_penalty"]
+        values[:, 42] = components["density_penalty"]
+        self._fill_stand(values, self.stands.stocks(np.arange(self.number)))
+        scaled = (values + _SHIFT) / _SCALE
+        scaled[:, 5:11] = self._observation[:, 5:11]
+        scaled[:, _SITE] = self._observation[:, _SITE]
+        scaled[:, [12, 14, 16]] = older
+        self._observation = scaled
+
+    @staticmethod
+    def _fill_stand(values, stocks) -> None:
+        """Stand and stocks, in their own units."""
+        density = stocks["density_stems_ha"]
+        values[:, 2], values[:, 3] = density, stocks["conifer_fraction"]
+        values[:, 38], values[:, 39] = stocks["biomass_kgc_m2"], stocks["soil_kgc_m2"]
+        values[:, 4] = values[:, 38] + values[:, 39]
+        values[:, _AGE] = stocks["age_classes"] / np.where(density > 0.0, density, 1.0)[:, None]
+
+    def get_state(self) -> dict:
+        """All that the future depends on."""
+        names = ("preference", "site_seeds", "episode_seeds", "year", "running", "history", "_observation")
+        return {"stands": self.stands.get_state(), **{name: getattr(self, name).copy() for name in names}}
+
+    def set_state(self, state: dict) -> None:
+        """Continue from `get_state`."""
+        self.stands.set_state(state["stands"])
+        for name, value in state.items():
+            if name != "stands":
+                setattr(self, name, value.copy())
+
+
+def check_preference(value) -> float:
+    """A preference weight of the carbon objective, in [0, 1]."""
+    number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+    if not number or not 0.0 <= value <= 1.0:
+        raise ValueError(f"preference: a number in [0, 1] is allowed, got {value!r}")
+    return float(value)
+
+
+def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict:
+    """Options of `reset`: "preference" and "site" (and what the vector environment adds)."""
+    allowed = ("preference", "site", *extra)
+    if options is not None and not isinstance(options, dict):
+        raise ValueError(f"reset options: a dict is allowed, got {type(options).__name__}")
+    for name in options or {}:
+        if name not in allowed:
+            raise ValueError(f"unknown reset option {name!r}; allowed: {', '.join(allowed)}")
+    return dict(options or {})
+
+
+def _check_choice(what, value, allowed) -> None:
+    if value not in allowed:
+        raise ValueError(f"{what} {value!r}: allowed are {', '.join(allowed)}")
+
+
+def warm_up() -> None:
+    """Compile the physics, or load it from the disk cache, so that processes forked later find it ready."""
+    compile_kernels()
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# The environment
+# ---------------------------------------------------------------------------------------------------------------
+
+
+class BorealEnv(gym.Env, EzPickle):
+    """
+    ## Description
+    A boreal stand on permafrost is managed for 50 years: each year a forester plants or thins, then the stand's
+    energy, water and carbon are simulated at a half-hourly step. Two objectives: store carbon, and keep heat out of
+    the permafrost.
+
+    ## Observation Space
+    `Box` of 105 values (generalist) or 43 (site-specific, without the 62 site parameters), float32;
+    `boreal_env.OBSERVATION` has the name, unit, normalisation and limits of each. The first is the preference for
+    carbon; pairs of years have the last year first; age fractions are of all stems.
+
+    ## Action Space
+    `Discrete(25)`: action = 5 x density index + mix index; density changes (-100, -50, 0, 50, 100) stems/ha, conifer
+    mixes (0, 0.25, 0.5, 0.75, 1). Planting adds seedlings of that mix; thinning cuts the oldest class first, so that
+    the remaining stand nears the mix. `action_masks()` says which actions can be carried out in full; the others are
+    legal, do what can be done, and cost a penalty.
+
+    ## Reward Space
+    `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, soil and wood products over `carbon_scale`,
+    less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2.
+
+    ## Starting State
+    Site, first stocks and ages, weather and preference are drawn anew in generalist mode, and are fixed in
+    site-specific mode (but the preference). Soil, snow and water are spun up.
+
+    ## Episode Termination
+    After 50 years the episode is terminated: nothing is worth anything beyond.
+
+    ## Arguments
+    - `mode`: "generalist" or "site_specific"
+    - `years`: length of an episode (50)
+    - `time_step_minutes`: any divisor of 1440 (30)
+    - `backend`: "numba" or "python" (the same source, interpreted)
+    - `thaw_formulation`: "asymmetric", "contrast" or "raw_degree_days"
+    - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one
+    - `site_seed`: one site (`sim.sample_site(site_seed)`) instead of a new one each episode
+    - `parameter_overrides`: site parameter -> value or (low, high)
+    - `initial_ranges`: first stock -> (low, high), see `sim.INITIAL_RANGES`
+    - `hwp_half_life_years`: half-life of wood products (None: for ever)
+    - `harvest_min_class`: youngest class that may be cut: "young", "mature" or "old"
+    - `reward`: a `Reward` or a dict of its constants
+    - `mechanisms`: switches of the physics, see `sim.MECHANISMS`
+    - `constants`: literature constants to override, see `sim/constants.csv`
+    - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`
+    - `record_years`: put the annual record into the last step's info, as `info["years"]`
+    - `render_mode`: "rgb_array" or None
+
+    `reset(seed=, options={"preference": w, "site": {name: value}})`. Bad values raise ValueError. `info` is empty
+    but for the last step, where it has the episode's totals.
+
+    ## Credits
+    After BoreaRL (Dsouza et al. 2025, arXiv 2509.19846).
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 5}
+
+    def __init__(self, *, render_mode: str | None = None, **kwargs):
+        EzPickle.__init__(self, render_mode=render_mode, **kwargs)
+        if render_mode is not None:
+            _check_choice("render_mode", render_mode, self.metadata["render_modes"])
+        self.render_mode = render_mode
+        self._episodes = _Episodes(1, **kwargs)
+        self.observation_space = observation_space(self._episodes.entries)
+        self.action_space = Discrete(NUM_ACTIONS)
+        self.reward_space = Box(-1.0, 1.0, (2,), np.float32)
+        self.reward_dim = 2
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None):
+        """Start an episode. options: "preference" (weight of carbon) and "site" (parameter -> value)."""
+        super().reset(seed=seed)
+        options = check_reset_options(options)
+        preference, site = options.get("preference"), options.get("site")
+        preference = None if preference is None else check_preference(preference)
+        sim.middle_site(site)
+        self._episodes.begin([0], [self._episodes.draw(self.np_random)], [preference], [site])
+        return self._episodes.observations()[0], {}
+
+    def step(self, action):
+        """One year under `action`, an integer in [0, 25)."""
+        values = np.asarray(action)
+        if values.size != 1:
+            raise ValueError(f"action {action!r}: one integer in [0, {NUM_ACTIONS}) is allowed")
+        reward = self._episodes.advance(values.reshape(1))[0]
+        terminated = not bool(self._episodes.running[0])
+        info = self._episodes.final_info(0) if terminated else {}
+        return self._episodes.observations()[0], reward, terminated, False, info
+
+    def action_masks(self) -> np.ndarray:
+        """Actions that can be carried out in full, bool, shape (25,)."""
+        observation = (self._episodes._observation).astype(np.float32)
+        return action_masks(observation, self._episodes.harvest_min_class)[0]
+
+    def render(self):
+        """A picture of the stand, uint8 (height, width, 3), with `render_mode="rgb_array"`; otherwise None."""
+        if self.render_mode is None:
+            return None
+        from analysis.drawing import draw_stand
+
+        return draw_stand(self._episodes, 0)
+
+    def get_state(self) -> dict:
+        """Everything the future depends on, generators included; picklable."""
+        return {"episodes": self._episodes.get_state(), "generator": self.np_random.bit_generator.state}
+
+    def set_state(self, state: dict) -> None:
+        """Continue from `get_state`."""
+        self._episodes.set_state(state["episodes"])
+        self.np_random.bit_generator.state = state["generator"]
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# The vector environment: all stands in lockstep, one compiled call, all cores
+# ---------------------------------------------------------------------------------------------------------------
+
+
+class BorealVectorEnv(VectorEnv):
+    """`num_envs` environments in lockstep, without worker processes; arguments as for `BorealEnv`.
+
+    With the same seeds and actions it gives the trajectories of `num_envs` single environments. Episodes that end
+    start anew within the step (`AutoresetMode.SAME_STEP`); infos then have `final_obs` and `final_info`.
+    `group_size` neighbours share site, start, weather and disturbance dice in every episode, not the preference.
+    `reset(options={"preference": one or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`.
+    """
+
+    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
+
+    def __init__(self, num_envs: int = 1, *, group_size: int = 1, render_mode: str | None = None, **kwargs):
+        if render_mode is not None:
+            raise ValueError(f"render_mode {render_mode!r}: the vector environment draws nothing; None is allowed")
+        if isinstance(num_envs, bool) or not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
+            raise ValueError(f"num_envs: a positive integer is allowed, got {num_envs!r}")
+        if isinstance(group_size, bool) or not isinstance(group_size, (int, np.integer)) or group_size < 1:
+            raise ValueError(f"group_size: a positive integer is allowed, got {group_size!r}")
+        if num_envs % group_size:
+            raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
+        self.num_envs, self.group_size = int(num_envs), int(group_size)
+        self._episodes = _Episodes(self.num_envs, **kwargs)
+        self.single_observation_space = observation_space(self._episodes.entries)
+        self.single_action_space = Discrete(NUM_ACTIONS)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.reward_space = Box(-1.0, 1.0, (2,), np.float32)
+        self.reward_dim = 2
+        self._generators: list[np.random.Generator] | None = None
+
+    def reset(self, *, seed=None, options: dict | None = None):
+        """Start episodes. seed : an integer (environment i gets seed + i), or one integer or None for each."""
+        options = check_reset_options(options, ("reset_mask",))
+        mask = np.ones(self.num_envs, bool) if options.get("reset_mask") is None else options["reset_mask"]
+        mask = np.asarray(mask)
+        if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
+            raise ValueError(f"reset_mask: {self.num_envs} booleans, at least one True, are allowed, got {mask!r}")
+        preferences = _spread("preference", options.get("preference"), self.num_envs)
+        preferences = [None if value is None else check_preference(value) for value in preferences]
+        sites = _spread("site", options.get("site"), self.num_envs)
+        for site in sites:
+            sim.middle_site(site)
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else seed
+        seeds = _spread("seed", seeds, self.num_envs)
+        if self._generators is None:
+            self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
+        for i, value in enumerate(seeds):
+            if value is not None and mask[i]:
+                self._generators[i] = gym.utils.seeding.np_random(int(value))[0]
+        self._begin(np.flatnonzero(mask), preferences, sites)
+        return self._episodes.observations(), {}
+
+    def step(self, actions):
+        """A year of every stand under `actions`, integers (num_envs,)."""
+        rewards = self._episodes.advance(actions)
+        ended = ~self._episodes.running
+        infos: dict = {}
+        observations = self._episodes.observations()
+        if ended.any():
+            indices = np.flatnonzero(ended)
+            for i in indices:
+                final = {"final_obs": observations[i].copy(), "final_info": self._episodes.final_info(i)}
+                infos = self._add_info(infos, final, i)
+            nothing = [None] * self.num_envs
+            self._begin(indices, nothing, nothing)
+            observations = self._episodes.observations()
+        return observations, rewards, ended, np.zeros(self.num_envs, bool), infos
+
+    def action_masks(self) -> np.ndarray:
+        """Actions that can be carried out in full, bool, shape (num_envs, 25)."""
+        return action_masks(self._episodes._observation.astype(np.float32), self._episodes.harvest_min_class)
+
+    def get_state(self) -> dict:
+        """Everything the future depends on, generators included; picklable."""
+        generators = self._generators and [g.bit_generator.state for g in self._generators]
+        return {"episodes": self._episodes.get_state(), "generators": generators}
+
+    def set_state(self, state: dict) -> None:
+        """Continue from `get_state`."""
+        self._episodes.set_state(state["episodes"])
+        self._generators = state["generators"] and [np.random.default_rng(0) for _ in range(self.num_envs)]
+        for generator, value in zip(self._generators or [], state["generators"] or []):
+            generator.bit_generator.state = value
+
+    def _begin(self, indices, preferences, sites) -> None:
+        draws = [self._episodes.draw(self._generators[i]) for i in indices]
+        if self.group_size > 1:
+            leaders = {}
+            for k, i in enumerate(indices):
+                site_seed, episode_seed, _ = leaders.setdefault(i // self.group_size, draws[k])
+                draws[k] = (site_seed, episode_seed, draws[k][2])
+        self._episodes.begin(indices, draws, [preferences[i] for i in indices], [sites[i] for i in indices])
+
+
+def _spread(name, value, number) -> list:
+    """One value for each environment, from one for all or a sequence."""
+    if value is None or isinstance(value, dict) or np.ndim(value) == 0:
+        return [value] * number
+    if len(value) != number:
+        raise ValueError(f"{name}: one value or {number} are allowed, got {len(value)}")
+    return list(value)
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# Registration
+# ---------------------------------------------------------------------------------------------------------------
+
+#: Carbon scale [kgC m-2 yr-1] at which both returns vary equally between policies of one site, as measured by
+#: `analysis/measure_balance.py`.
+BALANCED_CARBON_SCALE = 0.5
+
+for _name, _kwargs in {
+    "boreal-generalist-v0": {"mode": "generalist"},
+    "boreal-site-specific-v0": {"mode": "site_specific"},
+    "boreal-balanced-v0": {"mode": "generalist", "reward": asdict(Reward(carbon_scale=BALANCED_CARBON_SCALE))},
+}.items():
+    gym.register(
+        id=_name,
+        entry_point="boreal_env:BorealEnv",
+        vector_entry_point="boreal_env:BorealVectorEnv",
+        kwargs=_kwargs,
+    )
