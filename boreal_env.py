@@ -15,7 +15,8 @@ from gymnasium.vector.utils import batch_space
 
 import sim
 from sim.management import CONIFER_MIXES, DENSITY_CHANGES, LARGEST_DENSITY, LEAST_DENSITY, NEGLIGIBLE_STEMS, NUM_ACTIONS
-from sim.spin_up import check_initial, check_initial_ranges
+from sim.parameters import check_seed
+from sim.spin_up import check_initial_ranges
 from sim.stands import check_actions, compile_kernels, first_cut_age
 
 MODES = ("generalist", "site_specific")
@@ -137,7 +138,9 @@ def action_masks(observations: np.ndarray, harvest_min_class: str = "young") -> 
     Returns bool, shape (n, 25).
     """
     first_cut_age(harvest_min_class, {"young_age_limit": 40, "mature_age_limit": 100})
-    observations = np.atleast_2d(observations).astype(float)
+    observations = np.atleast_2d(np.asarray(observations, dtype=float))
+    if observations.ndim != 2 or observations.shape[1] < _AGE.stop:
+        raise ValueError(f"observations of shape {observations.shape}: (n, {_AGE.stop} or more) is allowed")
     density = observations[:, 2] * 1500.0
     fractions = observations[:, _AGE].reshape(-1, 2, len(AGE_CLASSES))
     harvestable = density * fractions[:, :, AGE_CLASSES.index(harvest_min_class) :].sum(axis=(1, 2))
@@ -179,7 +182,9 @@ class Reward:
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
                 raise ValueError(f"reward {field.name}: a finite number is allowed, got {value!r}")
             if value < 0.0 or (positive and value == 0.0):
-                raise ValueError(f"reward {field.name} = {value}: a {'positive' if positive else 'non-negative'} number")
+                raise ValueError(
+                    f"reward {field.name} = {value}: a {'positive' if positive else 'non-negative'} number is allowed"
+                )
 
     @staticmethod
     def of(values) -> "Reward":
@@ -264,13 +269,13 @@ class _Episodes:
         if fixed_preference is not None:
             fixed_preference = check_preference(fixed_preference)
         if site_seed is not None:
-            sim.sample_site(site_seed)
+            check_seed("site_seed", site_seed)
         if not isinstance(record_years, (bool, np.bool_)):
             raise ValueError(f"record_years: True or False is allowed, got {record_years!r}")
         self.number, self.mode, self.years = number, mode, int(years)
         self.thaw_formulation, self.fixed_preference = thaw_formulation, fixed_preference
-        self.site_seed, self.parameter_overrides = site_seed, dict(parameter_overrides or {})
         sim.middle_site(parameter_overrides)
+        self.site_seed, self.parameter_overrides = site_seed, dict(parameter_overrides or {})
         self.initial_ranges = check_initial_ranges(initial_ranges)
         self.harvest_min_class = harvest_min_class
         self.reward = Reward.of(reward)
@@ -279,12 +284,16 @@ class _Episodes:
             number, time_step_minutes=time_step_minutes, backend=backend, constants=constants, mechanisms=mechanisms,
             hwp_half_life_years=hwp_half_life_years, harvest_min_class=harvest_min_class,
         )  # fmt: skip
+        if isinstance(observation_groups, str) or not np.iterable(observation_groups or ()):
+            raise ValueError(f"observation_groups: a sequence of names is allowed, got {observation_groups!r}")
         groups = OBSERVATION_GROUPS if observation_groups is None else tuple(observation_groups)
         for group in groups:
             _check_choice("observation group", group, OBSERVATION_GROUPS)
         if mode == "site_specific":
             groups = tuple(group for group in groups if group != "site")
         self.entries = [i for i, entry in enumerate(OBSERVATION) if entry.group in groups]
+        if not self.entries:
+            raise ValueError(f"observation_groups = {observation_groups!r}: nothing is left to observe in mode {mode}")
         self.preference = np.zeros(number)
         self.site_seeds = np.zeros(number, dtype=np.int64)
         self.episode_seeds = np.zeros(number, dtype=np.int64)
@@ -387,7 +396,7 @@ class _Episodes:
 
     def _observe_start(self, indices, sites) -> None:
         """Observation of a fresh stand: history of an unchanged one."""
-        for i, site in zip(indices, sites):
+        for i, site in zip(indices, sites, strict=True):
             row = self._observation[i]
             row[:] = 0.0
             row[5:8] = [site[n] for n in ("latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c")]
@@ -450,6 +459,8 @@ class _Episodes:
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
+        if state["history"].shape != self.history.shape:
+            raise ValueError(f"state of episodes {state['history'].shape[:2]} given to {self.history.shape[:2]}")
         self.stands.set_state(state["stands"])
         for name, value in state.items():
             if name != "stands":
@@ -476,7 +487,7 @@ def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict
 
 
 def _check_choice(what, value, allowed) -> None:
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         raise ValueError(f"{what} {value!r}: allowed are {', '.join(allowed)}")
 
 
@@ -654,7 +665,7 @@ class BorealVectorEnv(VectorEnv):
             self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
         for i, value in enumerate(seeds):
             if value is not None and mask[i]:
-                self._generators[i] = gym.utils.seeding.np_random(int(value))[0]
+                self._generators[i] = gym.utils.seeding.np_random(check_seed("seed", value))[0]
         self._begin(np.flatnonzero(mask), preferences, sites)
         return self._episodes.observations(), {}
 
@@ -687,7 +698,7 @@ class BorealVectorEnv(VectorEnv):
         """Continue from `get_state`."""
         self._episodes.set_state(state["episodes"])
         self._generators = state["generators"] and [np.random.default_rng(0) for _ in range(self.num_envs)]
-        for generator, value in zip(self._generators or [], state["generators"] or []):
+        for generator, value in zip(self._generators or [], state["generators"] or [], strict=True):
             generator.bit_generator.state = value
 
     def _begin(self, indices, preferences, sites) -> None:
@@ -704,7 +715,7 @@ def _spread(name, value, number) -> list:
     """One value for each environment, from one for all or a sequence."""
     if value is None or isinstance(value, dict) or np.ndim(value) == 0:
         return [value] * number
-    if len(value) != number:
+    if isinstance(value, str) or len(value) != number:
         raise ValueError(f"{name}: one value or {number} are allowed, got {len(value)}")
     return list(value)
 

@@ -1,7 +1,7 @@
 """Canopy: structure through the year, and the energy balance that sets its temperature.
 
 The canopy stores no heat; its temperature is where radiation, sensible heat, evaporation, photosynthesis, snow and
-the trunk balance. The ground and the trunk answer to it within the same step (see `sim.soil.respond_to_canopy`), so that
+the trunk balance. The ground and the trunk answer to it within the same step (`sim.soil.respond_to_canopy`), so that
 all nodes exchange radiation at the same temperatures.
 """
 import math

@@ -7,7 +7,7 @@ from sim.canopy import leaf_out, stress_ramp
 from sim.carbon import litter_share
 from sim.demography import OLDEST, count, remove_share
 from sim.disturbance import between, fire_hazard, fire_weather
-from sim.jit import compiled
+from sim.jit import phase
 from sim.mathematics import exponential
 from sim.radiation import canopy_interception
 from sim.snow import AIR_HEAT_CAPACITY, bulk_density, conductivity
@@ -36,7 +36,7 @@ SNOW_DAY_MM = 1.0
 SPRING_ENDS = 212  # day of year after which remaining snow is not spring's
 
 
-@compiled
+@phase
 def begin_day(b, day, observed):
     """Weather and structure of day 0 to 364. observed : the day's forcing (steps, 6, lanes), or (0, 6, lanes)."""
     sun(b, day)
@@ -51,7 +51,7 @@ def begin_day(b, day, observed):
     clear_day(b)
 
 
-@compiled
+@phase
 def sun(b, day):
     """Coefficients of the cosine of the zenith angle: a + b cos(hour angle)."""
     w = b.w
@@ -64,7 +64,7 @@ def sun(b, day):
         w.extraterrestrial[i] = SOLAR_CONSTANT * distance
 
 
-@compiled
+@phase
 def generated_weather(b, day):
     """The day's weather from the site's climate and the day's draws."""
     p, w, d = b.p, b.w, b.d
@@ -144,7 +144,7 @@ def generated_weather(b, day):
         w.air_density[i] = 100.0 * p.air_pressure_hpa[i] / (287.05 * (temperature + FREEZING_POINT_K))
 
 
-@compiled
+@phase
 def observed_weather(b, observed):
     """What the day's processes need from an observed day: its mean, minimum, precipitation and clearness."""
     p, w = b.p, b.w
@@ -165,7 +165,7 @@ def observed_weather(b, observed):
         w.air_density[i] = 100.0 * p.air_pressure_hpa[i] / (287.05 * (mean + FREEZING_POINT_K))
 
 
-@compiled
+@phase
 def canopy_structure(b, day):
     """Leaf area, optical depths and exchange coefficients of the day."""
     s, p, w = b.s, b.p, b.w
@@ -218,19 +218,19 @@ def canopy_structure(b, day):
         w.vapour_density[i] = w.air_density[i] * 0.622 / p.air_pressure_hpa[i]
 
 
-@compiled
+@phase
 def wind_exchange(b, i, wind):
     """Exchange velocities of a lane at a wind speed [m s-1]."""
     p, w = b.p, b.w
     crowns = w.cover_conifer[i] + w.cover_deciduous[i]
     w.wind_below[i] = wind * (1.0 - p.wind_reduction[i] * crowns)
-    w.ground_velocity[i] = w.ground_log[i] * w.wind_below[i]
+    w.ground_velocity[i] = (w.snow_log[i] if b.s.swe[i] > SNOW_DAY_MM else w.ground_log[i]) * w.wind_below[i]
     w.canopy_velocity[i] = w.canopy_log[i] * wind
     exchange = w.air_density[i] * AIR_HEAT_CAPACITY * w.canopy_velocity[i]
     w.canopy_air[i] = exchange * max(w.longwave_cover[i], 1e-3)
 
 
-@compiled
+@phase
 def fire(b, day, i):
     """Drought index of the day, and a fire if dice, drought and warmth agree; at most one a year."""
     s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
@@ -265,10 +265,10 @@ def fire(b, day, i):
     crown_areas(b, i)
 
 
-@compiled
+@phase
 def litter(b, day):
     """Litter of the day, from trees to soil."""
-    s, p, w, r = b.s, b.p, b.w, b.r
+    s, p, r = b.s, b.p, b.r
     for i in range(len(s.swe)):
         share = p.litterfall_fraction[i] * litter_share(
             day, p.fall_start_day[i], p.litter_window_days[i], p.litterfall_seasonality[i]
@@ -281,7 +281,7 @@ def litter(b, day):
         r.litterfall_kgc_m2[i] += conifer + deciduous
 
 
-@compiled
+@phase
 def clear_day(b):
     """Remember the year's sums at the start of the day; the day's account is what is added to them."""
     w, r = b.w, b.r
@@ -306,7 +306,7 @@ def clear_day(b):
         w.deep_sum[i] = 0.0
 
 
-@compiled
+@phase
 def end_day(b, day, steps, daily):
     """Add the day to the year's account, and write its row of `daily` (365, columns, lanes) if that is wanted."""
     s, w, r = b.s, b.w, b.r
@@ -336,7 +336,7 @@ def end_day(b, day, steps, daily):
         write_day(b, steps, daily[day])
 
 
-@compiled
+@phase
 def write_day(b, steps, row):
     """One row of daily output, columns as in `sim.state.DAILY`."""
     s, w, r = b.s, b.w, b.r

@@ -20,7 +20,9 @@ def intercepted(fall, store, capacity, efficiency) -> float:
 
 
 @compiled
-def snow_sublimation(store, capacity, exposure, net, heat_transfer, deficit, slope, psychrometric, latent_heat, seconds):
+def snow_sublimation(
+    store, capacity, exposure, net, heat_transfer, deficit, slope, psychrometric, latent_heat, seconds
+) -> float:
     """Sublimation of intercepted snow [mm per step] from the exposed share of a full canopy (Penman 1948, over ice).
 
     net : net radiation of the canopy at air temperature [W m-2]; heat_transfer : conductance to the air

@@ -16,7 +16,8 @@ from pathlib import Path
 import numba
 from numba.core.dispatcher import Dispatcher
 
-compiled = numba.njit(error_model="numpy", nogil=True)
+compiled = numba.njit(error_model="numpy", nogil=True, forceinline=True)
+phase = numba.njit(error_model="numpy", nogil=True)
 
 
 @functools.cache

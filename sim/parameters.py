@@ -56,6 +56,20 @@ MECHANISMS = {
     "snowfall_limit": "less snowfall in very cold air",
 }
 
+#: Constants that make sense only in this order.
+ORDERED_CONSTANTS = (
+    ("surface_soil_depth_m", "deep_soil_depth_m"),
+    ("deep_soil_depth_m", "boundary_depth_m"),
+    ("tmin_low_conifer", "tmin_high_conifer"),
+    ("tmin_low_deciduous", "tmin_high_deciduous"),
+    ("vpd_low_hpa", "vpd_high_conifer_hpa"),
+    ("vpd_low_hpa", "vpd_high_deciduous_hpa"),
+    ("snow_albedo_old", "snow_albedo_fresh"),
+    ("fire_kill_low", "fire_kill_high"),
+    ("fire_organic_low", "fire_organic_high"),
+    ("insect_lethal_c", "insect_mild_c"),
+)
+
 _LATITUDE_SOUTH, _LATITUDE_RANGE = 56.0, 9.0
 _SITE_TEMPERATURE_SPREAD_C = 0.5
 
@@ -84,7 +98,8 @@ def sample_site(site_seed: int, overrides: dict | None = None) -> dict[str, floa
     else. Raises ValueError for an unknown name or a value outside physical limits.
     """
     overrides = check_overrides(overrides)
-    uniforms = dict(zip(SITE_PARAMETERS, np.random.default_rng(_check_seed("site_seed", site_seed)).random(62)))
+    generator = np.random.default_rng(check_seed("site_seed", site_seed))
+    uniforms = {name: generator.random() for name in SITE_PARAMETERS}
     site = {}
     for name, parameter in SITE_PARAMETERS.items():
         low, high = overrides.get(name, (parameter.low, parameter.high))
@@ -116,7 +131,7 @@ def scale_site(site: dict[str, float]) -> np.ndarray:
 def check_overrides(overrides: dict | None) -> dict[str, tuple[float, float]]:
     """Site overrides as name -> (low, high), checked against names and physical limits."""
     checked = {}
-    for name, value in _check_mapping("site parameters", overrides).items():
+    for name, value in check_mapping("site parameters", overrides).items():
         parameter = _lookup(SITE_PARAMETERS, "site parameter", name)
         ends = value if isinstance(value, (tuple, list)) else (value, value)
         if len(ends) != 2:
@@ -131,15 +146,18 @@ def check_overrides(overrides: dict | None) -> dict[str, tuple[float, float]]:
 def check_constants(overrides: dict | None) -> dict[str, float]:
     """All literature constants by name, with checked overrides."""
     values = {name: parameter.low for name, parameter in CONSTANTS.items()}
-    for name, value in _check_mapping("constants", overrides).items():
+    for name, value in check_mapping("constants", overrides).items():
         values[name] = _check_number(name, value, _lookup(CONSTANTS, "constant", name))
+    for low, high in ORDERED_CONSTANTS:
+        if values[low] >= values[high]:
+            raise ValueError(f"{low} = {values[low]:g} has to be less than {high} = {values[high]:g}")
     return values
 
 
 def check_mechanisms(switches: dict | None) -> dict[str, bool]:
     """All mechanism switches by name; those not given are on."""
     values = dict.fromkeys(MECHANISMS, True)
-    for name, value in _check_mapping("mechanisms", switches).items():
+    for name, value in check_mapping("mechanisms", switches).items():
         _lookup(MECHANISMS, "mechanism", name)
         if not isinstance(value, (bool, np.bool_)):
             raise ValueError(f"mechanism {name!r}: True or False is allowed, got {value!r}")
@@ -147,7 +165,8 @@ def check_mechanisms(switches: dict | None) -> dict[str, bool]:
     return values
 
 
-def _check_mapping(what: str, mapping) -> dict:
+def check_mapping(what: str, mapping) -> dict:
+    """A dict, or an empty one for None."""
     if mapping is None:
         return {}
     if not isinstance(mapping, dict):
@@ -174,7 +193,8 @@ def _check_number(name: str, value, parameter: Parameter) -> float:
     return float(value)
 
 
-def _check_seed(name: str, seed) -> int:
-    if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise ValueError(f"{name}: a non-negative integer is allowed, got {seed!r}")
+def check_seed(name: str, seed) -> int:
+    """A seed: an integer in [0, 2^63)."""
+    if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**63:
+        raise ValueError(f"{name}: an integer in [0, 2^63) is allowed, got {seed!r}")
     return int(seed)

@@ -2,7 +2,7 @@
 import numpy as np
 import pandas as pd
 
-from sim.parameters import middle_site
+from sim.parameters import check_seed, middle_site
 from sim.spin_up import check_initial
 from sim.stands import RECORD_NAMES, Seeds, Stands, check_actions
 from sim.state import DAILY, DAYS, FORCING
@@ -20,6 +20,7 @@ FORCING_LIMITS = {
 
 def episode_seeds(seed: int) -> Seeds:
     """Seeds of an episode's start, weather and disturbance, from one integer."""
+    seed = check_seed("seed", seed)
     return Seeds(*(int(s) for s in np.random.SeedSequence(seed).generate_state(3, np.uint64) >> np.uint64(1)))
 
 
@@ -67,8 +68,8 @@ def simulate(
     observed, days = None, DAYS
     if forcing is not None:
         observed, days = check_forcing(forcing, time_step_minutes, years)
-    given = {0: check_initial(initial)} if initial else None
-    stand.start(0, [middle_site(site)], [episode_seeds(seed)], given, observed=None if observed is None else observed[0])
+    first_weather = None if observed is None else observed[0]
+    stand.start(0, [middle_site(site)], [episode_seeds(seed)], {0: check_initial(initial)}, observed=first_weather)
 
     tables = []
     for year in range(years):
@@ -95,12 +96,17 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
     if missing:
         raise ValueError(f"forcing: column {missing[0]} is missing; needed: {', '.join(FORCING)}")
     index = forcing.index
-    gaps = np.unique(np.diff(index.to_numpy()))
-    if len(gaps) != 1:
-        late = index[1:][np.diff(index.to_numpy()) != index[1].to_numpy() - index[0].to_numpy()]
-        if not ((late.month == 3) & (late.day == 1)).all():
-            raise ValueError(f"forcing: times are not regular at {late[0]}; fill the gap or drop the year")
-    minutes = (index[1] - index[0]) / pd.Timedelta(minutes=1)
+    if len(index) < 2:
+        raise ValueError(f"forcing: {len(index)} rows; whole days at a regular interval are allowed")
+    interval = index[1] - index[0]
+    minutes = interval / pd.Timedelta(minutes=1)
+    if minutes <= 0:
+        raise ValueError(f"forcing: times do not increase at {index[1]}")
+    late = index[1:][np.diff(index.to_numpy()) != interval.to_timedelta64()]
+    for time in late:
+        leap_day_dropped = (time.month, time.day, time.hour, time.minute) == (3, 1, 0, 0) and time.is_leap_year
+        if not leap_day_dropped or time - interval - pd.Timedelta(days=1) not in index:
+            raise ValueError(f"forcing: times are not regular at {time}; fill the gap or drop the year")
     if time_step_minutes % minutes:
         raise ValueError(
             f"time_step_minutes = {time_step_minutes}: the forcing comes every {minutes:g} minutes; "
@@ -108,13 +114,16 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
         )
     kept = forcing.loc[~((index.month == 2) & (index.day == 29)), list(FORCING)]
     for name, (low, high, unit, hint) in FORCING_LIMITS.items():
+        if not pd.api.types.is_numeric_dtype(kept[name]):
+            raise ValueError(f"forcing: {name} has type {kept[name].dtype}; numbers are allowed")
         values = kept[name].to_numpy(float)
         wrong = ~((values >= low) & (values <= high))
         if wrong.any():
             at = kept.index[wrong][0]
             value = values[wrong][0]
             what = "a gap" if np.isnan(value) else f"{value:g}"
-            raise ValueError(f"forcing: {name} is {what} at {at}; [{low:g}, {high:g}] {unit} is allowed {hint}".rstrip())
+            why = f" ({hint})" if hint and not np.isnan(value) else ""
+            raise ValueError(f"forcing: {name} is {what} at {at}; [{low:g}, {high:g}] {unit} is allowed{why}")
     if (kept.index[0].month, kept.index[0].day, kept.index[0].hour, kept.index[0].minute) != (1, 1, 0, 0):
         raise ValueError(f"forcing starts at {kept.index[0]}; it has to start at 00:00 of 1 January")
     per_day = 1440 / minutes
@@ -126,4 +135,5 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
     steps = values.mean(axis=1)
     steps[:, FORCING.index("precipitation_mm")] *= group
     days = int(min(days, DAYS))
-    return [np.ascontiguousarray(year) for year in steps.reshape(-1, days * 1440 // time_step_minutes, len(FORCING))], days
+    by_year = steps.reshape(-1, days * 1440 // time_step_minutes, len(FORCING))
+    return [np.ascontiguousarray(year) for year in by_year], days

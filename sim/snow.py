@@ -2,7 +2,6 @@
 depth lies between it and the soil. Without snow the node is the ground's skin of moss and litter."""
 import math
 
-from sim.canopy import VON_KARMAN
 from sim.jit import compiled
 from sim.weather import FREEZING_POINT_K
 
@@ -43,13 +42,6 @@ def surface_albedo(swe, density, cover_depth, snow, ground) -> float:
     """Albedo of the ground, with snow hiding it from `cover_depth` [m] on (FSM2)."""
     hidden = min(swe / (density * cover_depth), 1.0)
     return ground + (snow - ground) * hidden
-
-
-@compiled
-def exchange_velocity(wind, cover, reduction, roughness, height) -> float:
-    """Neutral conductance for heat [m s-1] between the ground and the air under the canopy, logarithmic profile."""
-    profile = math.log(height / roughness)
-    return VON_KARMAN * VON_KARMAN * wind * (1.0 - reduction * cover) / (profile * profile)
 
 
 @compiled

@@ -1,7 +1,7 @@
 """The first state of a stand: stocks and ages drawn, soil, snow and water brought into balance with the site.
 
-Soil, snow and water start near the site's means and are spun up for a few years with the stand held fixed. The
-deep soil remembers decades, so after each of them it is put where the year's heat flows would balance.
+Soil, snow and water start near the site's means and are spun up under the mean year of its climate, with the stand
+held fixed. Deep soil remembers decades, more where it freezes; a secant search on its heat finds the balance in a few.
 """
 import math
 
@@ -10,14 +10,17 @@ import numpy as np
 from sim import soil
 from sim.demography import AGES, OLDEST
 from sim.jit import uncompiled
+from sim.parameters import check_mapping
 from sim.snow import LATENT_HEAT_FUSION
-from sim.state import STATE
+from sim.state import DAYS, STATE
 from sim.weather import FREEZING_POINT_K
 
 enthalpy = uncompiled(soil.enthalpy)
-temperature = uncompiled(soil.temperature)
 
-SPIN_UP_YEARS = 3
+SPIN_UP_YEARS = 8
+SPIN_UP_STEPS_PER_DAY = 12
+LONGEST_LEAP = 15.0  # years
+GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
 
 #: Ranges that the first stocks are drawn from.
 INITIAL_RANGES = {
@@ -42,15 +45,11 @@ INITIAL_LIMITS = {
 LARGEST_STEM_KGC = 120.0
 YEARLY_SURVIVAL = 0.975
 _WATER_DENSITY = 1000.0
-_SECONDS = 365.0 * 86400.0
 
 
 def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float]:
     """First stocks by record name, checked. Raises ValueError naming the value and what is allowed."""
-    if values is None:
-        return {}
-    if not isinstance(values, dict):
-        raise ValueError(f"initial: a dict of names and values is allowed, got {type(values).__name__}")
+    values = check_mapping("initial", values)
     for name, value in values.items():
         if name not in limits:
             raise ValueError(f"unknown initial stock {name!r}; allowed: {', '.join(limits)}")
@@ -63,7 +62,7 @@ def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float
 def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:
     """Ranges of first stocks, checked like `check_initial`; each a (low, high) pair."""
     checked = {}
-    for name, pair in (ranges or {}).items():
+    for name, pair in check_mapping("initial_ranges", ranges).items():
         if name not in INITIAL_RANGES:
             raise ValueError(f"unknown initial range {name!r}; allowed: {', '.join(INITIAL_RANGES)}")
         if not isinstance(pair, (tuple, list)) or len(pair) != 2:
@@ -128,16 +127,23 @@ def soil_node(parameters: dict, node: str) -> tuple[float, float, float, float]:
     return thawed * thickness, frozen * thickness, latent * thickness, parameters["soil_freezing_range_k"]
 
 
-def shift_deep_soil(state: np.ndarray, parameters: dict, record: dict) -> None:
-    """Put the deep soil at the temperature at which a year's heat flows would balance, in place.
+def climate_draws() -> dict[str, np.ndarray]:
+    """Draws of the climate's mean year: no noise, wet days spread evenly, each with the mean amount; no fire."""
+    evenly = (np.arange(DAYS) * GOLDEN_RATIO) % 1.0
+    return {"wet_dice": evenly, "wet_amount": np.ones(DAYS), "fire_dice": np.ones(DAYS)}
 
-    Both flows are conductive, so a surplus Q [W m-2] is gone when the node is Q / (g_above + g_below) warmer.
+
+def next_deep_heat(heat, gain, heat_before, gain_before) -> np.ndarray:
+    """Deep-soil enthalpy [J m-2] to start the next year of spin-up with, so that the deep soil comes to gain nothing.
+
+    heat, gain : enthalpy at the start of the year just run, and what the year added; *_before : of the year before,
+    or None. A secant step, no longer than `LONGEST_LEAP` years of the gain; shape (stands,) each.
     """
-    index = list(STATE).index("deep_heat")
-    node = soil_node(parameters, "deep")
-    surplus = 1e6 * record["deep_heat_gain_mj_m2"] / _SECONDS
-    surface, bottom = parameters["surface_soil_depth_m"], parameters["deep_soil_depth_m"]
-    above = parameters["soil_conductivity"] / (0.5 * bottom)
-    below = parameters["soil_conductivity"] / (parameters["boundary_depth_m"] - 0.5 * (surface + bottom))
-    now = temperature(state[index], *node)
-    state[index] = enthalpy(now + surplus / (above + below), *node)
+    if heat_before is None:
+        return heat + gain
+    steepness = gain - gain_before
+    moved = heat - heat_before
+    falling = steepness * moved < 0.0
+    secant = -gain * moved / np.where(falling, steepness, 1.0)
+    longest = LONGEST_LEAP * np.abs(gain)
+    return heat + np.where(falling, np.clip(secant, -longest, longest), np.sign(gain) * longest)

@@ -6,6 +6,7 @@ threads. So any subset of stands can be stepped together, in any order, with the
 """
 import os
 from concurrent.futures import ThreadPoolExecutor
+from numbers import Real
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -15,7 +16,14 @@ from sim.demography import AGE_CLASSES, AGES, SAPLING_LIMIT, SEEDLING_LIMIT
 from sim.jit import uncompiled
 from sim.management import NUM_ACTIONS, decode
 from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS, check_constants, check_mechanisms
-from sim.spin_up import INITIAL_RANGES, SPIN_UP_YEARS, first_state, shift_deep_soil
+from sim.spin_up import (
+    INITIAL_RANGES,
+    SPIN_UP_STEPS_PER_DAY,
+    SPIN_UP_YEARS,
+    climate_draws,
+    first_state,
+    next_deep_heat,
+)
 from sim.state import DAILY, DAYS, DRAWS, RECORD, STATE, block_dtype
 from sim.year import simulate_year
 
@@ -84,9 +92,7 @@ class Stands:
         self.constants = check_constants(constants)
         self.mechanisms = check_mechanisms(mechanisms)
         self.first_cut_age = first_cut_age(harvest_min_class, self.constants)
-        if hwp_half_life_years is not None and not hwp_half_life_years > 0.0:
-            raise ValueError(f"hwp_half_life_years = {hwp_half_life_years!r}: None or a positive number is allowed")
-        self.products_decay = 1.0 - 0.5 ** (1.0 / hwp_half_life_years) if hwp_half_life_years else 0.0
+        self.products_decay = yearly_decay(hwp_half_life_years)
         self.threads = threads or len(os.sched_getaffinity(0))
         self._pool = None
 
@@ -108,36 +114,40 @@ class Stands:
         """
         stands = np.atleast_1d(np.asarray(stands, dtype=int))
         ranges = {**INITIAL_RANGES, **(initial_ranges or {})}
-        draws = np.zeros((len(stands), SPIN_UP_YEARS, DRAWS_SIZE))
         for k, stand in enumerate(stands):
             site = sites[k]
             values = {**site, **self.constants, **self.mechanisms}
             self.parameters[stand] = [values[name] for name in PARAMETER_NAMES]
             generator = np.random.default_rng(seeds[k].start)
             self.state[stand] = first_state(values, generator, (initial or {}).get(k), ranges)
-            for year in range(SPIN_UP_YEARS):
-                draws[k, year] = draw_year(generator, generator)
             self.seeds[stand] = seeds[k]
             self.years[stand] = 0
             self._weather[stand] = np.random.default_rng(seeds[k].weather)
             self._disturbance[stand] = np.random.default_rng(seeds[k].disturbance)
         whole_year = observed is not None and len(observed) == DAYS * self.steps_per_day
-        self._spin_up(stands, draws, observed if whole_year else None)
+        self._spin_up(stands, observed if whole_year else None)
 
-    def _spin_up(self, stands, draws, observed=None) -> None:
+    def _spin_up(self, stands, observed=None) -> None:
         """Bring soil, snow and water into balance with the site, with the stand held as it is."""
         first = self.state[stands].copy()
-        physical = [STATE_NAMES.index(name) for name in STATE_NAMES if name not in HELD_IN_SPIN_UP]
-        calm = draws.copy()
-        calm[:, :, _draw_slice("fire_dice")] = 1.0
+        held = [STATE_NAMES.index(name) for name in HELD_IN_SPIN_UP] + list(range(len(STATE), STATE_SIZE))
+        deep = STATE_NAMES.index("deep_heat")
+        draws = np.zeros((len(stands), DRAWS_SIZE))
+        for name, values in climate_draws().items():
+            draws[:, _draw_slice(name)] = values
+        nothing = np.full(len(stands), 12)
+        steps = self.steps_per_day if observed is not None else min(self.steps_per_day, SPIN_UP_STEPS_PER_DAY)
+        heat_before = gain_before = None
         for year in range(SPIN_UP_YEARS):
-            state, record = self._run(stands, calm[:, year], np.full(len(stands), 12), observed)
-            self.state[stands] = first
-            self.state[np.ix_(stands, physical)] = state[:, physical]
-            for k, stand in enumerate(stands):
-                parameters = dict(zip(PARAMETER_NAMES, self.parameters[stand]))
-                shift_deep_soil(self.state[stand], parameters, dict(zip(RECORD_NAMES, record[k])))
-            self._check(stands, record, "spin-up")
+            heat = self.state[stands, deep].copy()
+            state, record = self._run(stands, draws, nothing, observed, steps_per_day=steps)
+            self._check(stands, state, record, "spin-up")
+            state[:, held] = first[:, held]
+            gain = state[:, deep] - heat
+            if year > 0:  # the first year only lays the snow
+                state[:, deep] = next_deep_heat(heat, gain, heat_before, gain_before)
+                heat_before, gain_before = heat, gain
+            self.state[stands] = state
 
     def step(self, actions, stands=None, observed=None, days=DAYS, daily=False):
         """Advance stands by a year under the given actions.
@@ -156,7 +166,7 @@ class Stands:
             draws[k] = draw_year(self._weather[stand], self._disturbance[stand])
         rows = np.empty((len(stands), days, len(DAILY))) if daily else None
         state, record = self._run(stands, draws, actions, observed, days, rows)
-        self._check(stands, record, "year")
+        self._check(stands, state, record, "year")
         self.state[stands] = state
         self.record[stands] = record
         self.years[stands] += 1
@@ -202,7 +212,7 @@ class Stands:
         self._weather = [_generator(g) for g in state["weather"]]
         self._disturbance = [_generator(g) for g in state["disturbance"]]
 
-    def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None):
+    def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None, steps_per_day=None):
         """The new states and records of a year, without touching anything: (stands, fields) each."""
         state = np.empty((len(stands), STATE_SIZE))
         record = np.empty((len(stands), len(RECORD)))
@@ -211,7 +221,7 @@ class Stands:
             rows = None if daily is None else daily[chunk]
             state[chunk], record[chunk] = self._run_block(
                 self.parameters[stands[chunk]], self.state[stands[chunk]], draws[chunk], actions[chunk],
-                observed, days, rows,
+                observed, days, rows, steps_per_day or self.steps_per_day,
             )  # fmt: skip
 
         chunks = blocks(len(stands), self.threads)
@@ -224,7 +234,7 @@ class Stands:
             list(self._pool.map(run, chunks))
         return state, record
 
-    def _run_block(self, parameters, state, draws, actions, observed, days, daily):
+    def _run_block(self, parameters, state, draws, actions, observed, days, daily, steps_per_day):
         """One call of the kernel. Lanes that are left over repeat the last stand."""
         number = len(parameters)
         lanes = LANES if number > 1 else 1
@@ -242,10 +252,10 @@ class Stands:
         forcing = np.zeros((0, 6, lanes)) if observed is None else np.repeat(observed[:, :, None], lanes, axis=2)
         output = np.zeros((0 if daily is None else days, len(DAILY), lanes))
         if self.backend == "numba":
-            simulate_year(block[0], self.steps_per_day, days, forcing, output)
+            simulate_year(block[0], steps_per_day, days, forcing, output)
         else:
             with np.errstate(all="ignore"):
-                uncompiled(simulate_year)(_namespace(block[0]), self.steps_per_day, days, forcing, output)
+                uncompiled(simulate_year)(_namespace(block[0]), steps_per_day, days, forcing, output)
         if daily is not None:
             daily[:] = output[:, :, :number].transpose(2, 0, 1)
         first = parameters.shape[1]
@@ -253,22 +263,29 @@ class Stands:
         record = rows[first + STATE_SIZE + DRAWS_SIZE :][: len(RECORD), :number].T
         return new_state, record
 
-    def _check(self, stands, record, what) -> None:
-        """Raise `PhysicsError` where a year did not close."""
+    def _check(self, stands, state, record, what) -> None:
+        """Raise `PhysicsError` where a year did not close, or left a number that is not finite."""
         columns = [RECORD_NAMES.index(name) for name in TOLERANCES]
         stocks = 1.0 + record[:, RECORD_NAMES.index("density_stems_ha")]
         limits = np.array(list(TOLERANCES.values())) * np.ones((len(stands), 1))
         limits[:, list(TOLERANCES).index("stems_residual_ha")] *= stocks
         failed = ~(record[:, columns] <= limits)
-        if not failed.any():
+        infinite = ~np.isfinite(state).all(axis=1)
+        if not failed.any() and not infinite.any():
             return
-        k, column = np.argwhere(failed)[0]
+        if failed.any():
+            k, column = np.argwhere(failed)[0]
+            problem = f"{list(TOLERANCES)[column]} = {record[k, columns[column]]:.3g} beyond {limits[k, column]:.1g}"
+        else:
+            k = int(np.argmax(infinite))
+            wrong = [name for name, value in zip(STATE_NAMES, state[k], strict=False) if not np.isfinite(value)]
+            problem = f"{', '.join(wrong) or 'stems'} not finite"
         stand = stands[k]
-        terms = ", ".join(f"{name}={value:.6g}" for name, value in zip(RECORD_NAMES, record[k]))
-        site = ", ".join(f"{n}={v:.6g}" for n, v in zip(PARAMETER_NAMES, self.parameters[stand]))
+        terms = ", ".join(f"{name}={value:.6g}" for name, value in zip(RECORD_NAMES, record[k], strict=True))
+        site = ", ".join(f"{n}={v:.6g}" for n, v in zip(PARAMETER_NAMES, self.parameters[stand], strict=True))
         raise PhysicsError(
-            f"{list(TOLERANCES)[column]} = {record[k, columns[column]]:.3g} beyond {limits[k, column]:.1g} in "
-            f"{what} {self.years[stand]} of stand {stand}, {self.seeds[stand]}; record: {terms}; site: {site}"
+            f"{problem} in {what} {self.years[stand]} of stand {stand}, {self.seeds[stand]}; "
+            f"record: {terms}; site: {site}"
         )
 
 
@@ -308,9 +325,19 @@ def first_cut_age(harvest_min_class: str, constants: dict) -> int:
         "mature": int(constants["young_age_limit"]) + 1,
         "old": int(constants["mature_age_limit"]) + 1,
     }
-    if harvest_min_class not in ages:
+    if not isinstance(harvest_min_class, str) or harvest_min_class not in ages:
         raise ValueError(f"harvest_min_class {harvest_min_class!r}: allowed are {', '.join(AGE_CLASSES[2:])}")
     return ages[harvest_min_class]
+
+
+def yearly_decay(half_life_years) -> float:
+    """Share of wood products lost in a year; None is a half-life without end."""
+    if half_life_years is None:
+        return 0.0
+    number = isinstance(half_life_years, Real) and not isinstance(half_life_years, (bool, np.bool_))
+    if not number or not 0.1 <= half_life_years <= 1e4:
+        raise ValueError(f"hwp_half_life_years: None or a number in [0.1, 10000] is allowed, got {half_life_years!r}")
+    return 1.0 - 0.5 ** (1.0 / half_life_years)
 
 
 def check_actions(actions, number) -> np.ndarray:

@@ -8,7 +8,7 @@ from sim.canopy import NEWTON_LIMIT, NEWTON_TOLERANCE, canopy_balance, newton_st
 from sim.carbon import SECONDS_PER_YEAR, autotrophic, maintenance, photosynthesis, q10_factor
 from sim.day import wind_exchange
 from sim.interception import intercepted, snow_capacity, snow_melt, snow_sublimation, unloaded
-from sim.jit import compiled
+from sim.jit import phase
 from sim.radiation import (
     black_body,
     black_body_slope,
@@ -33,6 +33,7 @@ from sim.water import runoff, water_stress
 from sim.weather import (
     FREEZING_POINT_K,
     PSYCHROMETRIC_PER_HPA,
+    SATURATION_AT_FREEZING_HPA,
     saturation_pressure,
     saturation_pressure_water,
     saturation_slope,
@@ -43,7 +44,7 @@ NO_CAP = 1e3  # degC
 THIN_SNOW_MM = 0.1  # less does not hold the ground at 0 degC: it melts with little of the step's heat
 
 
-@compiled
+@phase
 def simulate_step(b, t, cos_hour, sin_hour, sun_up, seconds, observed):
     """Advance a block by one step of `seconds`.
 
@@ -59,7 +60,11 @@ def simulate_step(b, t, cos_hour, sin_hour, sun_up, seconds, observed):
         sunlight(b, t, cos_hour, observed)
     else:
         darkness(b)
-    canopy_stores(b, seconds)
+    if any_snow(b):
+        snowfall(b, seconds)
+    else:
+        no_snow(b)
+    rainfall(b)
     conductances(b, seconds)
     solve_canopy(b)
     move_energy_and_water(b, seconds)
@@ -67,7 +72,7 @@ def simulate_step(b, t, cos_hour, sin_hour, sun_up, seconds, observed):
     balance(b, seconds)
 
 
-@compiled
+@phase
 def generated_air(b, cos_hour, sin_hour, seconds):
     """Air temperature, longwave and precipitation of the step, from the day's generated weather."""
     w = b.w
@@ -77,7 +82,7 @@ def generated_air(b, cos_hour, sin_hour, seconds):
         w.precipitation_step[i] = w.precipitation[i] * (seconds / 86400.0)
 
 
-@compiled
+@phase
 def observed_air(b, row):
     """The same from observation; row : (6, lanes), columns as in `sim.state.FORCING`."""
     w = b.w
@@ -89,7 +94,7 @@ def observed_air(b, row):
         wind_exchange(b, i, row[2, i])
 
 
-@compiled
+@phase
 def stores_before(b):
     """Saturation, rain and snow of the step, and what is stored before it."""
     s, p, w = b.s, b.p, b.w
@@ -109,9 +114,19 @@ def stores_before(b):
         w.water_before[i] = ice + s.canopy_rain[i] + s.soil_water[i]
 
 
-@compiled
-def canopy_stores(b, seconds):
-    """Interception, sublimation, melt and unloading in the canopy; what falls reaches snow or soil."""
+@phase
+def any_snow(b):
+    """Whether snow falls or lies in any lane, in the canopy or on the ground."""
+    s, w = b.s, b.w
+    total = 0.0
+    for i in range(len(s.swe)):
+        total += w.snow[i] + s.canopy_snow[i] + s.swe[i]
+    return total > 0.0
+
+
+@phase
+def snowfall(b, seconds):
+    """Snow caught, sublimated, melted and shed by the canopy; what falls to the ground."""
     s, p, w = b.s, b.p, b.w
     for i in range(len(s.swe)):
         capacity = snow_capacity(w.air[i], w.snow_area[i], p.snow_capacity_warm_mm[i], p.snow_capacity_cold_mm[i])
@@ -131,12 +146,7 @@ def canopy_stores(b, seconds):
         fallen = unloaded(store, capacity, melted, p.snow_unloading_hours[i], p.snow_unloading_melt[i], seconds)
         s.canopy_snow[i] = store - fallen
         w.canopy_sublimation[i] = lost
-
-        held = intercepted(w.rain[i], s.canopy_rain[i], w.rain_capacity[i], w.longwave_cover[i])
-        wet = s.canopy_rain[i] + held + melted
-        drip = max(wet - w.rain_capacity[i], 0.0)
-        s.canopy_rain[i] = wet - drip
-        w.infiltration[i] = w.rain[i] - held + drip
+        w.canopy_melt[i] = melted
         w.fixed[i] += (LATENT_HEAT_SUBLIMATION * lost + LATENT_HEAT_FUSION * melted) / seconds
 
         # Snow reaches the ground as cold as the air; the heat it brings is the heat its mass gains.
@@ -144,17 +154,48 @@ def canopy_stores(b, seconds):
         w.advected[i] = ICE_HEAT_CAPACITY * ground_snow * min(w.air[i], 0.0)
         heat = (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) * s.ground[i] + w.advected[i]
         s.swe[i] += ground_snow
-        s.ground[i] = heat / (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i])
-        s.albedo[i] = snow_albedo(
+        mixed = heat / (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i])
+        s.ground[i] = mixed if ground_snow > 0.0 else s.ground[i]
+        aged = snow_albedo(
             s.albedo[i], s.ground[i], ground_snow, p.snow_albedo_fresh[i], p.snow_albedo_old[i],
             p.snow_albedo_cold_hours[i], p.snow_albedo_melt_hours[i], p.snow_albedo_refresh_mm[i], seconds,
         )  # fmt: skip
+        s.albedo[i] = aged if s.swe[i] > 0.0 else p.snow_albedo_fresh[i]
 
 
-@compiled
+@phase
+def no_snow(b):
+    """The same without any snow."""
+    w = b.w
+    for i in range(len(b.s.swe)):
+        w.canopy_sublimation[i] = 0.0
+        w.canopy_melt[i] = 0.0
+        w.advected[i] = 0.0
+        b.s.albedo[i] = b.p.snow_albedo_fresh[i]
+
+
+@phase
+def rainfall(b):
+    """Rain and melt held by the canopy; what drips or falls through reaches the soil."""
+    s, w = b.s, b.w
+    for i in range(len(s.swe)):
+        held = intercepted(w.rain[i], s.canopy_rain[i], w.rain_capacity[i], w.longwave_cover[i])
+        wet = s.canopy_rain[i] + held + w.canopy_melt[i]
+        drip = max(wet - w.rain_capacity[i], 0.0)
+        s.canopy_rain[i] = wet - drip
+        w.infiltration[i] = w.rain[i] - held + drip
+
+
+@phase
 def sunlight(b, t, cos_hour, observed):
     """Shortwave absorbed by canopy and ground, and photosynthesis."""
     s, p, w = b.s, b.p, b.w
+    if observed.shape[0] > 0:
+        for i in range(len(s.swe)):
+            w.shortwave[i] = observed[t, 3, i]
+    else:
+        for i in range(len(s.swe)):
+            w.shortwave[i] = w.top_of_canopy[i] * max(w.sun_a[i] + w.sun_b[i] * cos_hour, 0.0)
     for i in range(len(s.swe)):
         cos_zenith = max(w.sun_a[i] + w.sun_b[i] * cos_hour, 0.0)
         path = path_length(cos_zenith, p.slant_path[i], p.slant_path_max[i])
@@ -164,7 +205,6 @@ def sunlight(b, t, cos_hour, observed):
         ground = surface_albedo(
             s.swe[i], w.snow_density[i], p.snow_cover_depth_m[i], s.albedo[i], p.ground_albedo[i]
         )  # fmt: skip
-        w.shortwave[i] = observed[t, 3, i] if observed.shape[0] > 0 else w.top_of_canopy[i] * cos_zenith
         w.canopy_sw[i], w.ground_sw[i], w.reflected[i], light_conifer, light_deciduous = shortwave(
             w.shortwave[i], w.diffuse[i], beam_conifer, beam_deciduous, w.sky_conifer[i], w.sky_deciduous[i],
             p.albedo_conifer[i], p.albedo_deciduous[i], ground,
@@ -187,7 +227,7 @@ def sunlight(b, t, cos_hour, observed):
         w.leaf_coefficient[i] = leaves * stress * thawed
 
 
-@compiled
+@phase
 def darkness(b):
     """The same at night."""
     w = b.w
@@ -202,7 +242,7 @@ def darkness(b):
         w.leaf_coefficient[i] = 0.0
 
 
-@compiled
+@phase
 def conductances(b, seconds):
     """Conductances at the start of the step, evaporation coefficients, and the nodes' answer to the canopy."""
     s, p, w = b.s, b.p, b.w
@@ -225,7 +265,10 @@ def conductances(b, seconds):
         snow = s.swe[i] > 0.0
         over_ice = saturation_pressure(min(s.ground[i], 0.0))
         ice_slope = saturation_slope(min(s.ground[i], 0.0), over_ice)
-        transfer = w.vapour_density[i] * velocity
+        # No more snow than there is can sublimate within the step, even at 0 degC: the limit is on the conductance,
+        # so that the ground's equation and what is moved agree.
+        drying = max(SATURATION_AT_FREEZING_HPA - w.vapour[i], 1e-3)
+        transfer = min(w.vapour_density[i] * velocity, s.swe[i] / (seconds * drying))
         stress = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i])
         sky_and_canopy = longwave_down(w.sky[i], black_body(w.air[i] + FREEZING_POINT_K), w.longwave_cover[i])
         available = w.ground_sw[i] + p.ground_emissivity[i] * (sky_and_canopy - emission)
@@ -233,7 +276,8 @@ def conductances(b, seconds):
         w.ground_latent[i] = (
             LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.vapour[i]) if snow else moist * max(available, 0.0)
         )
-        w.latent_slope[i] = LATENT_HEAT_SUBLIMATION * transfer * ice_slope if snow else 0.0
+        deep_snow = s.swe[i] > THIN_SNOW_MM
+        w.latent_slope[i] = LATENT_HEAT_SUBLIMATION * transfer * ice_slope if deep_snow else 0.0
 
         w.surface[i] = temperature(
             s.surface_heat[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], p.soil_freezing_range_k[i]
@@ -271,7 +315,7 @@ def conductances(b, seconds):
             heat_capacity(w.deep[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], p.soil_freezing_range_k[i])
             / seconds
         )
-        w.cap[i] = 0.0 if s.swe[i] > THIN_SNOW_MM else NO_CAP
+        w.cap[i] = 0.0 if deep_snow else NO_CAP
         (
             w.deep_base[i], w.deep_by_surface[i], w.surface_base[i], w.surface_by_ground[i], w.trunk_base[i],
             w.trunk_by_canopy[i], w.trunk_by_ground[i], w.ground_base[i], w.ground_by_emission[i],
@@ -290,7 +334,7 @@ def conductances(b, seconds):
         w.high[i] = w.air[i] + 100.0
 
 
-@compiled
+@phase
 def canopy_residual(b):
     """Residual of the canopy's balance at the trial temperatures; returns whether any lane is still off."""
     s, p, w = b.s, b.p, b.w
@@ -307,7 +351,7 @@ def canopy_residual(b):
     return worst > NEWTON_TOLERANCE
 
 
-@compiled
+@phase
 def solve_canopy(b):
     """Newton's method for all lanes together; a lane that has converged stays where it is."""
     w = b.w
@@ -322,7 +366,7 @@ def solve_canopy(b):
         iterations += 1
 
 
-@compiled
+@phase
 def move_energy_and_water(b, seconds):
     """Fluxes at the step's temperatures, moved between the stores."""
     s, p, w, r = b.s, b.p, b.w, b.r
@@ -427,7 +471,7 @@ def move_energy_and_water(b, seconds):
         r.canopy_residual_w_m2[i] = max(r.canopy_residual_w_m2[i], abs(w.residual[i]))
 
 
-@compiled
+@phase
 def move_carbon(b, seconds):
     """Photosynthesis and respiration, moved between air, trees and soil."""
     s, p, w, r = b.s, b.p, b.w, b.r
@@ -462,7 +506,7 @@ def move_carbon(b, seconds):
         r.heterotrophic_respiration_kgc_m2[i] += soil
 
 
-@compiled
+@phase
 def balance(b, seconds):
     """Whether the stores changed by what crossed the stand's boundary, energy and water."""
     s, p, w, r = b.s, b.p, b.w, b.r

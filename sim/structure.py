@@ -1,13 +1,13 @@
 """From stems to crowns: cover, the two species' shares, and the light use of old trees."""
 from sim.canopy import crown_factor
 from sim.demography import AGES, OLDEST
-from sim.jit import compiled
+from sim.jit import compiled, phase
 from sim.mathematics import exponential
 
 SQUARE_METRES_PER_HECTARE = 1e4
 
 
-@compiled
+@phase
 def crown_areas(b, i):
     """Crown area, cover and light use of a lane's stand, from its stems by age (crowns overlap at random)."""
     s, p, w = b.s, b.p, b.w

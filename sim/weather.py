@@ -11,6 +11,7 @@ from sim.mathematics import exponential
 SOLAR_CONSTANT = 1361.0  # W m-2
 STEFAN_BOLTZMANN = 5.670374419e-8  # W m-2 K-4
 FREEZING_POINT_K = 273.15
+SATURATION_AT_FREEZING_HPA = 6.1121
 PSYCHROMETRIC_PER_HPA = 6.65e-4  # K-1; times the air pressure, gamma of Priestley and Taylor (1972)
 DAYS_PER_YEAR = 365
 
@@ -126,7 +127,7 @@ def diffuse_share(clearness: float) -> float:
     if k <= 0.22:
         return 1.0 - 0.09 * k
     if k <= 0.80:
-        return 0.9511 - 0.1604 * k + 4.388 * k * k - 16.638 * k**3 + 12.336 * k**4
+        return 0.9511 - 0.1604 * k + 4.388 * k * k - 16.638 * k * k * k + 12.336 * k * k * k * k
     return 0.165
 
 

@@ -17,7 +17,7 @@ from sim.demography import (
     self_thinning,
 )
 from sim.disturbance import between, outbreak_probability
-from sim.jit import compiled, compiled_and_cached
+from sim.jit import compiled_and_cached, phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
 from sim.snow import LATENT_HEAT_FUSION
 from sim.soil import organic_layer, thaw_depth
@@ -54,7 +54,7 @@ def simulate_year(b, steps_per_day, days, observed, daily):
     end_year(b)
 
 
-@compiled
+@phase
 def any_sun(b, t, cos_hour, observed):
     """Whether the sun, or observed shortwave, reaches any lane."""
     for i in range(len(b.s.swe)):
@@ -65,7 +65,7 @@ def any_sun(b, t, cos_hour, observed):
     return False
 
 
-@compiled
+@phase
 def begin_year(b):
     """1 and 2 of the timeline: the action, and what follows from the stand's structure."""
     for i in range(len(b.s.swe)):
@@ -76,7 +76,7 @@ def begin_year(b):
         grow_trunk(b, i)
 
 
-@compiled
+@phase
 def clear_year(b, i):
     """Note the year's first stocks and clear its running sums; the record itself comes in as zeros."""
     s, w = b.s, b.w
@@ -96,7 +96,7 @@ def clear_year(b, i):
     w.thaw_heat[i] = 0.0
 
 
-@compiled
+@phase
 def manage(b, i):
     """Plant or thin: seedlings of the wanted mix; or the oldest stems, so that the stand nears the mix."""
     s, p, w, r = b.s, b.p, b.w, b.r
@@ -148,7 +148,7 @@ def manage(b, i):
         r.mortality_kgc_m2[i] += dead
 
 
-@compiled
+@phase
 def site_constants(b, i):
     """What the parameters fix for the year: angles, wind profiles, the soil nodes."""
     p, w = b.p, b.w
@@ -158,8 +158,10 @@ def site_constants(b, i):
     w.cos_warmest[i], w.sin_warmest[i] = math.cos(warmest), math.sin(warmest)
     peak = 2.0 * math.pi * p.peak_diurnal_hour[i] / 24.0
     w.cos_peak[i], w.sin_peak[i] = math.cos(peak), math.sin(peak)
-    profile = math.log(p.ground_reference_height_m[i] / p.soil_roughness_m[i])
-    w.ground_log[i] = (VON_KARMAN / profile) ** 2
+    height, rough = p.ground_reference_height_m[i], p.soil_roughness_m[i]
+    ground = VON_KARMAN / math.log(height / rough)
+    snow = VON_KARMAN / math.log(height / min(p.snow_roughness_m[i], rough))
+    w.ground_log[i], w.snow_log[i] = ground * ground, snow * snow
     w.canopy_log[i] = aerodynamic_conductance(
         1.0, p.canopy_roughness_m[i], p.canopy_reference_height_m[i], p.excess_resistance[i]
     )
@@ -180,17 +182,17 @@ def site_constants(b, i):
     w.deep_to_boundary[i] = p.boundary_depth_m[i] - surface - 0.5 * deep
 
 
-@compiled
+@phase
 def grow_trunk(b, i):
     """Heat capacity of the trunks; wood that grew or went takes its heat along, a named flux."""
-    s, p, w, r = b.s, b.p, b.w, b.r
+    s, p, r = b.s, b.p, b.r
     biomass = s.conifer_biomass[i] + s.deciduous_biomass[i]
     capacity = LEAST_TRUNK_CAPACITY + p.trunk_heat_per_carbon[i] * biomass
     r.growth_heat_mj_m2[i] = 1e-6 * (capacity - s.trunk_capacity[i]) * s.trunk[i]
     s.trunk_capacity[i] = capacity
 
 
-@compiled
+@phase
 def end_year(b):
     """4 of the timeline: insects, mortality, recruitment, ageing, the organic layer, products, the account."""
     for i in range(len(b.s.swe)):
@@ -199,7 +201,7 @@ def end_year(b):
         write_record(b, i)
 
 
-@compiled
+@phase
 def renew_stems(b, i):
     """Insects, background mortality and self-thinning, recruitment, ageing."""
     s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
@@ -243,7 +245,7 @@ def renew_stems(b, i):
     grow_older(s.deciduous_stems, i)
 
 
-@compiled
+@phase
 def decay(b, i):
     """The organic layer moves toward its canopy's equilibrium; products decay if they have a half-life."""
     s, p, w, r = b.s, b.p, b.w, b.r
@@ -256,7 +258,7 @@ def decay(b, i):
     r.hwp_decay_kgc_m2[i] = lost
 
 
-@compiled
+@phase
 def write_record(b, i):
     """5 of the timeline: stocks at the year's end, means, and what the year failed to close."""
     s, p, w, r = b.s, b.p, b.w, b.r
