@@ -1,0 +1,1 @@
+"""Evaluation protocol, metrics and tables of the benchmark."""
