@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from sim import soil
-from sim.demography import AGES, OLDEST
+from sim.demography import AGE_CLASSES, AGES, OLDEST, SAPLING_LIMIT, SEEDLING_LIMIT
 from sim.jit import uncompiled
 from sim.parameters import check_mapping
 from sim.snow import LATENT_HEAT_FUSION
@@ -31,6 +31,9 @@ INITIAL_RANGES = {
     "oldest_age_years": (30.0, 110.0),
 }
 
+#: Stems by species and age class, which can be given instead of density, conifer fraction and oldest age.
+CLASS_NAMES = tuple(f"{species}_{age}_stems_ha" for species in ("conifer", "deciduous") for age in AGE_CLASSES)
+
 #: Physical limits of the first stocks.
 INITIAL_LIMITS = {
     "density_stems_ha": (0.0, 10000.0),
@@ -40,6 +43,7 @@ INITIAL_LIMITS = {
     "oldest_age_years": (1.0, 200.0),
     "hwp_kgc_m2": (0.0, 60.0),
     "organic_layer_m": (0.0, 2.0),
+    **dict.fromkeys(CLASS_NAMES, (0.0, 10000.0)),
 }
 
 LARGEST_STEM_KGC = 120.0
@@ -53,6 +57,8 @@ def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float
     for name, value in values.items():
         if name not in limits:
             raise ValueError(f"unknown initial stock {name!r}; allowed: {', '.join(limits)}")
+        if name in CLASS_NAMES and set(values) & {"density_stems_ha", "conifer_fraction", "oldest_age_years"}:
+            raise ValueError(f"initial {name}: stems by class exclude density, conifer fraction and oldest age")
         low, high = limits[name]
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not low <= value <= high:
             raise ValueError(f"initial {name} = {value!r}: a number in [{low:g}, {high:g}] is allowed")
@@ -78,15 +84,17 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
     """State vector of a stand before spin-up, shape (fields of `STATE` + ages of both species,).
 
     parameters : all parameters by name; given : stocks by record name, in place of drawn ones. As many numbers are
-    drawn whatever is given. Stems are spread over ages 1 to the oldest, thinning out by `YEARLY_SURVIVAL` a year.
+    drawn whatever is given.
     """
     stocks = {name: low + (high - low) * generator.random() for name, (low, high) in ranges.items()}
     stocks.update(given or {})
-    density, mix = stocks["density_stems_ha"], stocks["conifer_fraction"]
-    oldest = max(1, int(round(stocks["oldest_age_years"])))
-    ages = np.zeros(AGES)
-    np.add.at(ages, np.minimum(np.arange(1, oldest + 1), OLDEST), YEARLY_SURVIVAL ** np.arange(oldest))
-    ages *= density / ages.sum()
+    if any(name in CLASS_NAMES for name in stocks):
+        conifers, deciduous = stems_of_classes(stocks, parameters)
+    else:
+        ages = stems_of_ages(stocks["oldest_age_years"]) * stocks["density_stems_ha"]
+        conifers, deciduous = stocks["conifer_fraction"] * ages, (1.0 - stocks["conifer_fraction"]) * ages
+    density = conifers.sum() + deciduous.sum()
+    mix = conifers.sum() / density if density > 0.0 else stocks["conifer_fraction"]
     biomass = stocks["biomass_kgc_m2"]
     if given is None or "biomass_kgc_m2" not in given:
         biomass = min(biomass, density * LARGEST_STEM_KGC * 1e-4) if density > 0.0 else biomass
@@ -113,7 +121,27 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         "albedo": parameters["snow_albedo_fresh"],
         "soil_water": 0.7 * parameters["max_water_content_mm"],
     }
-    return np.concatenate([list(state.values()), mix * ages, (1.0 - mix) * ages])
+    return np.concatenate([list(state.values()), conifers, deciduous])
+
+
+def stems_of_ages(oldest_age: float) -> np.ndarray:
+    """Shares of stems by age, shape (AGES,): ages 1 to the oldest, fewer by `YEARLY_SURVIVAL` each year."""
+    ages = np.zeros(AGES)
+    oldest = max(1, int(round(oldest_age)))
+    np.add.at(ages, np.minimum(np.arange(1, oldest + 1), OLDEST), YEARLY_SURVIVAL ** np.arange(oldest))
+    return ages / ages.sum()
+
+
+def stems_of_classes(stocks: dict, parameters: dict) -> np.ndarray:
+    """Stems by species and age, shape (2, AGES), spread evenly over the ages of each class."""
+    last = [SEEDLING_LIMIT, SAPLING_LIMIT, int(parameters["young_age_limit"]), int(parameters["mature_age_limit"])]
+    first = [0, *(age + 1 for age in last)]
+    stems = np.zeros((2, AGES))
+    for k, name in enumerate(CLASS_NAMES):
+        row, age_class = divmod(k, len(AGE_CLASSES))
+        ages = slice(first[age_class], [*last, OLDEST][age_class] + 1)
+        stems[row, ages] = stocks.get(name, 0.0) / (ages.stop - ages.start)
+    return stems
 
 
 def soil_node(parameters: dict, node: str) -> tuple[float, float, float, float]:

@@ -222,9 +222,10 @@ def sunlight(b, t, cos_hour, observed):
         )  # fmt: skip
         w.fixed[i] = 1000.0 * p.photosynthesis_energy[i] * (w.gpp_conifer[i] + w.gpp_deciduous[i])
 
-        thawed = 1.0 if w.air[i] > 0.0 else 0.0
+        # Stomata open in light and above freezing; a lane in the dark is as in `darkness`, whatever its neighbours.
+        open_stomata = 1.0 if w.air[i] > 0.0 and w.shortwave[i] > 0.0 else 0.0
         leaves = w.transpiration_conifer[i] * dry_conifer + w.transpiration_deciduous[i] * dry_deciduous
-        w.leaf_coefficient[i] = leaves * stress * thawed
+        w.leaf_coefficient[i] = leaves * stress * open_stomata
 
 
 @phase
@@ -250,8 +251,12 @@ def conductances(b, seconds):
         slope = saturation_slope(w.air[i], w.saturation[i])
         equilibrium = slope / (slope + PSYCHROMETRIC_PER_HPA * p.air_pressure_hpa[i])
         wet_share = s.canopy_rain[i] / w.rain_capacity[i] if w.rain_capacity[i] > 0.0 else 0.0
-        w.dry_coefficient[i] = (1.0 - wet_share) * equilibrium * w.leaf_coefficient[i]
-        w.wet_coefficient[i] = wet_share * equilibrium * p.priestley_taylor_wet[i]
+        dry = (1.0 - wet_share) * equilibrium * w.leaf_coefficient[i]
+        wet = wet_share * equilibrium * p.priestley_taylor_wet[i]
+        # Above 35 degC Priestley and Taylor's 1.26 would evaporate more than the net radiation.
+        all_of_it = max(dry + wet, 1.0)
+        w.dry_coefficient[i] = dry / all_of_it
+        w.wet_coefficient[i] = wet / all_of_it
         w.wet_limit[i] = LATENT_HEAT_VAPORISATION * s.canopy_rain[i] / seconds
 
         velocity = w.ground_velocity[i] * stability(
