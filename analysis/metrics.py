@@ -1,0 +1,169 @@
+"""Metrics of multi-objective policies, and statistics over training seeds.
+
+An *evaluation* is the DataFrame of a run's `evaluation.csv`, restricted to one policy (greedy or sampled):
+one row per episode, with the columns `preference` (the carbon weight w_C), `seed` (of the episode: the same
+seed is the same site and weather under every weight and method), `carbon_return` and `thaw_return`. Both
+objectives are maximised; a set of points is an array (n, 2) of [carbon, thaw].
+"""
+
+import moocore
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+OBJECTIVES = ["carbon_return", "thaw_return"]
+REFERENCE_POINT = (-2.0, -2.0)
+
+
+def scalarize(carbon, thaw, preference):
+    """Scalarised return w_C carbon + (1 - w_C) thaw [-]; scalars or arrays of one shape."""
+    return preference * carbon + (1 - preference) * thaw
+
+
+def mean_returns(evaluation: pd.DataFrame) -> pd.DataFrame:
+    """Mean of both returns over the episodes of each weight; index: the weights in ascending order."""
+    return evaluation.groupby("preference")[OBJECTIVES].mean().sort_index()
+
+
+def mean_scalarized(evaluation: pd.DataFrame) -> float:
+    """Scalarised return, averaged over weights and episodes."""
+    returns = scalarize(evaluation.carbon_return, evaluation.thaw_return, evaluation.preference)
+    return float(returns.mean())
+
+
+# ------------------------------------------------------------------------------------------------ fronts
+
+
+def nondominated(points: np.ndarray) -> np.ndarray:
+    """The points that no other point dominates, (k, 2), without duplicates."""
+    return moocore.filter_dominated(np.asarray(points, dtype=float), maximise=True)
+
+
+def hypervolume(points: np.ndarray, reference: tuple[float, float] = REFERENCE_POINT) -> float:
+    """Area dominated by the points above the reference point (points not above it in both add nothing)."""
+    return float(moocore.hypervolume(np.asarray(points, dtype=float), ref=list(reference), maximise=True))
+
+
+def sparsity(points: np.ndarray) -> float:
+    """Mean squared gap between neighbours on the front, summed over objectives; 0 for fewer than two points.
+
+    As in morl-baselines (Xu et al. 2020, eq. 8): each objective is sorted by itself, nothing is normalised.
+    """
+    front = nondominated(points)
+    if len(front) < 2:
+        return 0.0
+    gaps = np.diff(np.sort(front, axis=0), axis=0)
+    return float((gaps**2).sum() / (len(front) - 1))
+
+
+def expected_utility(points: np.ndarray, n_weights: int = 50) -> float:
+    """Mean over equally spaced weights of the best scalarised point (Zintgraf et al. 2015)."""
+    weights = np.linspace(0, 1, n_weights)
+    utilities = np.stack([weights, 1 - weights], axis=1) @ np.asarray(points, dtype=float).T
+    return float(utilities.max(axis=1).mean())
+
+
+def cardinality(points: np.ndarray) -> int:
+    """Number of different points on the front."""
+    return len(nondominated(points))
+
+
+# ----------------------------------------------------------------------------- paired over the same episodes
+
+
+def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame) -> pd.DataFrame:
+    """The evaluation with the returns of zero change on the same site and weather subtracted.
+
+    Raises ValueError if zero change was not evaluated on every one of the evaluation's seeds.
+    """
+    reference = zero_change.drop_duplicates("seed").set_index("seed")[OBJECTIVES]
+    missing = sorted(set(evaluation.seed) - set(reference.index))
+    if missing:
+        raise ValueError(f"zero change was not evaluated on the episode with seed {missing[0]} "
+                         f"(nor on {len(missing) - 1} others); evaluate both with the same --eval-episodes")
+    difference = evaluation.copy()
+    difference[OBJECTIVES] -= reference.loc[evaluation.seed].to_numpy()
+    return difference
+
+
+def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean over the first axis and half the width of its 95 % t interval (NaN for fewer than two values)."""
+    values = np.asarray(values, dtype=float)
+    n = len(values)
+    if n < 2:
+        return values.mean(axis=0), np.full(values.shape[1:], np.nan)
+    return values.mean(axis=0), stats.t.ppf(0.975, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
+
+
+def paired_returns(evaluation: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (k,) ascending, and both returns of every episode under every weight, (episodes, k, 2).
+
+    Raises ValueError if the weights were not evaluated on the same episodes.
+    """
+    tables = [evaluation.pivot(index="seed", columns="preference", values=name) for name in OBJECTIVES]
+    if any(table.isna().to_numpy().any() for table in tables):
+        raise ValueError("the weights were not evaluated on the same episodes: they cannot be paired")
+    return tables[0].columns.to_numpy(), np.stack([table.to_numpy() for table in tables], axis=2)
+
+
+def _violates(changes: np.ndarray, margin: np.ndarray | float = 0.0) -> np.ndarray:
+    """Whether carbon fell or thaw rose by more than the margin between adjacent weights; changes (k, 2)."""
+    return ((changes * [-1, 1]) > margin).any(axis=-1)
+
+
+def violations_percent(returns: np.ndarray) -> float:
+    """Share of adjacent pairs of weights that violate lambda-monotonicity [%].
+
+    returns: (k, 2) mean returns, in ascending order of the carbon weight. As that weight rises, carbon must
+    not fall and thaw must not rise. NaN for fewer than two weights.
+    """
+    changes = np.diff(np.asarray(returns, dtype=float), axis=0)
+    return 100 * float(_violates(changes).mean()) if len(changes) else np.nan
+
+
+def significant_violations_percent(evaluation: pd.DataFrame) -> float:
+    """The same, counting only changes larger than their paired 95 % interval [%]."""
+    _, returns = paired_returns(evaluation)
+    if returns.shape[1] < 2:
+        return np.nan
+    change, half_width = mean_interval(np.diff(returns, axis=1))
+    return 100 * float(_violates(change, half_width).mean())
+
+
+def preference_response(evaluation: pd.DataFrame) -> pd.DataFrame:
+    """How both returns follow the preference, over the paired episodes, with 95 % intervals.
+
+    Rows carbon_return and thaw_return. Columns: `change` from the lowest to the highest weight, `slope` of
+    the return against the weight (least squares within each episode), each with `_low` and `_high`.
+    """
+    weights, returns = paired_returns(evaluation)
+    if len(weights) < 2:
+        raise ValueError(f"a response to the preference needs two weights or more, not {len(weights)}")
+    centred = weights - weights.mean()
+    slopes = np.tensordot(returns, centred, axes=(1, 0)) / (centred**2).sum()
+    table = pd.DataFrame(index=OBJECTIVES)
+    for name, values in (("change", returns[:, -1] - returns[:, 0]), ("slope", slopes)):
+        mean, half_width = mean_interval(values)
+        table[name], table[f"{name}_low"], table[f"{name}_high"] = mean, mean - half_width, mean + half_width
+    return table
+
+
+# ------------------------------------------------------------------------------------ over training seeds
+
+
+def iqm(values: np.ndarray) -> float:
+    """Interquartile mean: the mean of the middle half (Agarwal et al. 2021)."""
+    return float(stats.trim_mean(np.asarray(values, dtype=float), 0.25))
+
+
+def bootstrap_interval(values: np.ndarray, repetitions: int = 50_000) -> tuple[float, float]:
+    """95 % percentile bootstrap interval of the IQM over training seeds (NaN for fewer than two seeds).
+
+    values: (seeds,), one number per training run, already averaged over its episodes. Deterministic.
+    """
+    values = np.asarray(values, dtype=float)
+    if len(values) < 2:
+        return np.nan, np.nan
+    resampled = np.random.default_rng(0).choice(values, (repetitions, len(values)))
+    low, high = np.percentile(stats.trim_mean(resampled, 0.25, axis=1), [2.5, 97.5])
+    return float(low), float(high)

@@ -1,0 +1,129 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import metrics
+from analysis.make_tables import PAPER_TABLES
+
+FRONT = np.array([(0, 3), (1, 2), (3, 0)])
+
+
+def paper_front(method):
+    details = pd.read_csv(PAPER_TABLES / "detailed_objectives.csv")
+    rows = details[details.method == method].sort_values("lambda_carbon")
+    return rows[["carbon_mean", "thaw_mean"]].to_numpy()
+
+
+def evaluation(carbon, thaw, weights):
+    """Evaluation from returns of shape (episodes, weights)."""
+    episodes = np.asarray(carbon).shape[0]
+    return pd.DataFrame({
+        "preference": np.tile(weights, episodes),
+        "seed": np.repeat(np.arange(episodes), len(weights)),
+        "carbon_return": np.ravel(carbon),
+        "thaw_return": np.ravel(thaw),
+    })
+
+
+def test_golden_front():
+    assert metrics.hypervolume(FRONT, reference=(-1, -1)) == pytest.approx(9.0)
+    assert metrics.sparsity(FRONT) == pytest.approx(5.0)
+    assert metrics.expected_utility(FRONT) == pytest.approx(2.2653, abs=5e-5)
+    assert metrics.cardinality(FRONT) == 3
+
+
+def test_dominated_points_and_duplicates_change_nothing():
+    more = np.vstack([FRONT, [(0, 0), (1, 2)]])
+    assert metrics.sparsity(more) == metrics.sparsity(FRONT)
+    assert metrics.hypervolume(more) == metrics.hypervolume(FRONT)
+    assert metrics.cardinality(more) == 3
+
+
+def test_points_below_the_reference_have_no_hypervolume():
+    assert metrics.hypervolume([(100, -2.5)]) == 0
+    assert metrics.hypervolume([(0, 0)]) == pytest.approx(4)
+
+
+def test_one_point_has_no_sparsity():
+    assert metrics.sparsity([(1, 1)]) == 0
+
+
+@pytest.mark.parametrize("method, hypervolume, sparsity, violations", [
+    ("curriculum_ppo", 119.80, 3.4, 50),
+    ("ppo_gated", 65.20, 19.5, 100),
+    ("eupg_variable_lambda", 24.54, 14.4, None),
+])
+def test_paper_against_its_own_details(method, hypervolume, sparsity, violations):
+    front = paper_front(method)
+    assert metrics.hypervolume(front) == pytest.approx(hypervolume, abs=0.005)
+    assert metrics.sparsity(front) == pytest.approx(sparsity, abs=0.05)
+    if violations is not None:
+        assert metrics.violations_percent(front) == violations
+
+
+def test_monotone_front_has_no_violations_and_a_reversed_one_has_only_violations():
+    assert metrics.violations_percent(FRONT) == 0
+    assert metrics.violations_percent(FRONT[::-1]) == 100
+    assert np.isnan(metrics.violations_percent(FRONT[:1]))
+
+
+def test_only_consistent_violations_are_significant():
+    weights = [0.0, 0.5, 1.0]
+    noise = np.array([-1.0, 1.0] * 10)[:, None]
+    # carbon falls by 0.1 in every episode from weight 0 to .5; thaw rises by 0.1 +- 1 from .5 to 1
+    carbon = np.array([1.0, 0.9, 2.0]) + 5 * noise
+    thaw = np.concatenate([3 + 0 * noise, 2 + 0 * noise, 2.1 + noise], axis=1)
+    table = evaluation(carbon, thaw, weights)
+    assert metrics.violations_percent(metrics.mean_returns(table)) == 100
+    assert metrics.significant_violations_percent(table) == 50
+
+
+def test_response_to_the_preference():
+    weights = [0.0, 0.5, 1.0]
+    site = np.array([-4.0, 0.0, 7.0])[:, None]
+    slope = np.array([1.0, 2.0, 3.0])[:, None]
+    table = evaluation(site + slope * weights, site - np.array(weights), weights)
+    response = metrics.preference_response(table)
+    assert response.loc["carbon_return", "change"] == pytest.approx(2)
+    assert response.loc["carbon_return", "slope"] == pytest.approx(2)
+    # the 0.975 quantile of t with 2 degrees of freedom is 4.302653, the standard error 1 / sqrt(3)
+    high = response.loc["carbon_return", "change_high"]
+    assert high == pytest.approx(2 + 4.302653 / np.sqrt(3), abs=1e-5)
+    assert response.loc["thaw_return", "change"] == pytest.approx(-1)
+    assert response.loc["thaw_return", "change_low"] == pytest.approx(-1)
+
+
+def test_unpaired_weights_are_refused():
+    table = evaluation(np.zeros((2, 2)), np.zeros((2, 2)), [0.0, 1.0])
+    with pytest.raises(ValueError, match="same episodes"):
+        metrics.preference_response(table.iloc[:-1])
+
+
+def test_gains_subtract_zero_change_on_the_same_episode():
+    ours = evaluation([[11, 12], [21, 22]], [[1, 2], [3, 4]], [0.0, 1.0])
+    zero_change = evaluation([[20], [10]], [[1], [1]], [0.0]).assign(seed=[1, 0])
+    gains = metrics.gains(ours, zero_change)
+    assert gains.carbon_return.tolist() == [1, 2, 1, 2]
+    assert gains.thaw_return.tolist() == [0, 1, 2, 3]
+    with pytest.raises(ValueError, match="seed 1"):
+        metrics.gains(ours, zero_change[zero_change.seed == 0])
+
+
+def test_mean_scalarized():
+    table = evaluation([[10, 20]], [[1, 2]], [0.25, 1.0])
+    assert metrics.mean_scalarized(table) == pytest.approx((0.25 * 10 + 0.75 * 1 + 20) / 2)
+
+
+def test_interquartile_mean_ignores_the_outer_quarters():
+    assert metrics.iqm([-1000, 1, 2, 3, 4, 5, 6, 1000]) == pytest.approx(3.5)
+
+
+def test_bootstrap_interval():
+    values = np.random.default_rng(3).normal(5, 1, 10)
+    low, high = metrics.bootstrap_interval(values)
+    assert (low, high) == metrics.bootstrap_interval(values)
+    assert low < metrics.iqm(values) < high
+    # about +-2 standard errors; the IQM of a normal sample has 1.2 times the variance of its mean
+    assert 0.6 < (high - low) / (4 * values.std() * np.sqrt(1.2 / 10)) < 1.4
+    assert metrics.bootstrap_interval([2.0, 2.0, 2.0]) == (2.0, 2.0)
+    assert np.isnan(metrics.bootstrap_interval([2.0])).all()
