@@ -1,0 +1,39 @@
+"""The progress line."""
+
+import sys
+import time
+from collections import deque
+
+import numpy as np
+
+
+class Progress:
+    """One line that says how far a job is: rewritten in place on a terminal, else one every ten seconds.
+
+    `returns` holds the [carbon, thaw] returns of the last episodes, whose mean the line shows.
+    """
+
+    def __init__(self, label: str, total: int, unit: str):
+        self.label, self.total, self.unit = label, total, unit
+        self.terminal = sys.stdout.isatty()
+        self.interval = 0.5 if self.terminal else 10.0
+        self.start = time.perf_counter()
+        self.shown = -np.inf
+        self.returns = deque(maxlen=100)
+
+    def show(self, done: int) -> None:
+        """Show the line if it is time to, and always at the end."""
+        now = time.perf_counter()
+        if now - self.shown < self.interval and done < self.total:
+            return
+        self.shown = now
+        rate = done / (now - self.start)
+        line = (f"{self.label} {done:,}/{self.total:,} {self.unit}, {rate:,.0f}/s, "
+                f"{(self.total - done) / rate / 60:.1f} min left")
+        if self.returns:
+            carbon, thaw = np.mean(self.returns, axis=0)
+            line += f", last {len(self.returns)} episodes: carbon {carbon:+.2f}, thaw {thaw:+.2f}"
+        if self.terminal:
+            print("\r" + line.ljust(110), end="\n" if done >= self.total else "", flush=True)
+        else:
+            print(line, flush=True)

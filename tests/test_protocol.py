@@ -1,0 +1,235 @@
+import json
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+import pytest
+from scripts import run_script
+from toy_env import LENGTH, optimal_return
+
+from analysis import evaluation, protocol
+from analysis.progress import Progress
+
+
+@dataclass
+class Arguments:
+    """The arguments that every script has."""
+
+    seed: int = 1
+    env_id: str | None = "toy_env:toy-v0"
+    mode: str | None = None
+    site_seed: int | None = None
+    thaw_formulation: str = "asymmetric"
+    eval_episodes: int = 3
+    eval_weights: tuple = (0.0, 0.5, 1.0)
+    run_dir: str | None = None
+    overwrite: bool = False
+    colour: str = field(default="red")
+
+
+def evaluate(policy, **changes):
+    args = Arguments(**changes)
+    return protocol.evaluate(args, protocol.prepare(args), policy)
+
+
+def optimal(observations, masks, accrued_returns):
+    """The toy's best policy: plants wherever it may, with the best mix for the preference."""
+    mixes = np.linspace(0, 1, 5)
+    weights = observations[:, :1]
+    mix = (weights * mixes + (1 - weights) * (1 - mixes**2)).argmax(axis=1)
+    return np.eye(25)[np.where(masks[:, 15], 15, 0) + mix]
+
+
+def uniform(observations, masks, accrued_returns):
+    return masks / masks.sum(axis=1, keepdims=True)
+
+
+# --------------------------------------------------------------------------------------------- evaluation
+
+
+def test_the_optimal_policy_earns_the_optimum():
+    episodes, years = evaluate(optimal)
+    assert years is None
+    assert tuple(episodes.columns) == evaluation.EVALUATION_COLUMNS
+    assert len(episodes) == 2 * 3 * 3
+    np.testing.assert_allclose(episodes.scalarized_return, episodes.preference.map(optimal_return), rtol=1e-6)
+    np.testing.assert_allclose(
+        episodes.scalarized_return,
+        episodes.preference * episodes.carbon_return + (1 - episodes.preference) * episodes.thaw_return)
+
+
+def test_results_do_not_depend_on_the_chunks(monkeypatch):
+    whole, _ = evaluate(uniform)
+    monkeypatch.setattr(evaluation, "CHUNK", 4)
+    pd.testing.assert_frame_equal(whole, evaluate(uniform)[0])
+
+
+def test_a_sampled_policy_is_reproducible_and_not_greedy():
+    episodes, _ = evaluate(uniform)
+    pd.testing.assert_frame_equal(episodes, evaluate(uniform)[0])
+    by_policy = [rows.carbon_return.to_numpy() for _, rows in episodes.groupby("policy")]
+    assert not np.array_equal(*by_policy)
+
+
+def test_every_weight_has_the_same_episodes():
+    # a policy blind to the preference does the same in them, with the same draws
+    episodes, _ = evaluate(uniform)
+    sampled = episodes[episodes.policy == "sampled"]
+    table = sampled.pivot(index="seed", columns="preference", values="carbon_return")
+    assert (table.nunique(axis=1) == 1).all() and table[0.0].nunique() == 3
+    assert sampled.seed.min() >= protocol.FIRST_EVALUATION_SEED
+    highest_training_seed = (protocol.LIMITS["seed"][1] + 1) * protocol.MAX_ENVS - 1
+    assert highest_training_seed < protocol.FIRST_EVALUATION_SEED
+
+
+def test_the_policy_sees_the_accrued_returns():
+    seen = []
+
+    def policy(observations, masks, accrued_returns):
+        seen.append(accrued_returns.copy())
+        return optimal(observations, masks, accrued_returns)
+
+    episodes, _ = evaluate(policy, eval_weights=(1.0,), eval_episodes=2)
+    assert len(seen) == 2 * LENGTH
+    for step, accrued in enumerate(seen[:LENGTH]):
+        np.testing.assert_allclose(accrued, [[step, 0]] * 2)
+
+
+def test_sampling_follows_the_probabilities():
+    probabilities = np.tile([0.0, 0.25, 0.0, 0.75, 0.0], (10_000, 1))
+    actions = evaluation.choose_actions(probabilities, np.random.default_rng(0).random(10_000))
+    assert set(actions) == {1, 3}
+    assert (actions == 3).mean() == pytest.approx(0.75, abs=0.02)
+    extremes = evaluation.choose_actions(probabilities[:2], np.array([0.0, np.nextafter(1, 0)]))
+    assert extremes.tolist() == [1, 3]
+    assert evaluation.choose_actions(probabilities[:1], None).tolist() == [3]
+
+
+def test_statistics_of_the_annual_record():
+    records = [{"year": np.array([1, 2]), "density": np.array([1.0, 2.0]) * k, "fraction": np.full(2, k)}
+               for k in range(5)]
+    table = evaluation.summarize_years("greedy", 0.5, records).set_index(["variable", "year"])
+    assert len(table) == 4
+    row = table.loc[("density", 2)]
+    assert (row["mean"], row.p50, row.p10, row.p90) == (4.0, 4.0, 0.8, 7.2)
+    assert row.sd == pytest.approx(np.std([0, 2, 4, 6, 8]))
+    assert table.loc[("fraction", 1), "mean"] == 2
+
+
+def test_boreal_environments_are_evaluated_on_the_same_sites_with_their_annual_record():
+    def zero_change(observations, masks, accrued_returns):
+        return np.eye(25)[np.full(len(observations), 12)]
+
+    episodes, years = evaluate(zero_change, env_id="boreal-generalist-v0", eval_episodes=2,
+                               eval_weights=(0.0, 1.0))
+    paired = episodes.groupby("seed")[["site_seed", "carbon_return", "thaw_return"]]
+    assert paired.nunique().eq(1).all(axis=None)
+    assert episodes.site_seed.nunique() == 2
+    assert episodes[list(evaluation.EVALUATION_INFO)].gt(0).all(axis=None)
+    one_policy = years[(years.policy == "greedy") & (years.preference == 1)]
+    density = one_policy[one_policy.variable == "density_stems_ha"]
+    assert density.year.tolist() == list(range(1, 51))
+    assert (density.p10 <= density["mean"]).all() and (density["mean"] <= density.p90).all()
+
+
+def test_a_greedy_policy_in_site_specific_mode_is_evaluated_once():
+    episodes, _ = evaluate(uniform, env_id="boreal-site-specific-v0", eval_episodes=2, eval_weights=(0.0,))
+    assert episodes.policy.value_counts().to_dict() == {"sampled": 2, "greedy": 1}
+
+
+# --------------------------------------------------------------------------------------------- run folder
+
+
+def make_run(folder, overwrite=False, **changes):
+    args = Arguments(run_dir=str(folder), overwrite=overwrite, **changes)
+    protocol.prepare(args)
+    return protocol.Run(args, "script", episodes=("step", "value"))
+
+
+def test_rows_are_on_disk_at_once(tmp_path):
+    run = make_run(tmp_path / "run")
+    run.log("episodes", {"step": np.int64(1), "value": 1 / 3})
+    run.log("episodes", {"step": 2})
+    assert (tmp_path / "run" / "episodes.csv").read_text() == "step,value\n1,0.333333333\n2,\n"
+    assert run.table_sizes() == {"episodes": 28}
+    with pytest.raises(ValueError):
+        run.log("episodes", {"steps": 3})
+
+
+def test_replacing_keeps_the_old_file_if_writing_fails(tmp_path):
+    path = tmp_path / "file"
+    path.write_bytes(b"old")
+    with pytest.raises(RuntimeError), protocol.replacing(path) as file:
+        file.write(b"half")
+        raise RuntimeError
+    assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
+    with protocol.replacing(path) as file:
+        file.write(b"new")
+    assert path.read_bytes() == b"new" and list(tmp_path.iterdir()) == [path]
+
+
+def test_other_arguments_are_refused_and_named(tmp_path):
+    make_run(tmp_path, colour="red")
+    before = (tmp_path / "config.json").read_bytes()
+    with pytest.raises(SystemExit, match="colour red there, blue now; eval_episodes 3 there, 4 now|"
+                                         "eval_episodes 3 there, 4 now; colour red there, blue now"):
+        make_run(tmp_path, colour="blue", eval_episodes=4)
+    assert (tmp_path / "config.json").read_bytes() == before
+
+
+def test_unfinished_runs_are_refused_unless_overwritten(tmp_path):
+    make_run(tmp_path).log("episodes", {"step": 1, "value": 1.0})
+    with pytest.raises(SystemExit, match="unfinished.*--overwrite starts over"):
+        make_run(tmp_path)
+    make_run(tmp_path, overwrite=True, colour="blue")
+    assert (tmp_path / "episodes.csv").read_text() == "step,value\n"
+    assert json.loads((tmp_path / "config.json").read_text())["arguments"]["colour"] == "blue"
+
+
+def test_foreign_folders_are_never_touched(tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    for overwrite in (False, True):
+        with pytest.raises(SystemExit, match="no config.json"):
+            make_run(tmp_path, overwrite=overwrite)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_damaged_configuration_is_named(tmp_path):
+    (tmp_path / "config.json").write_text("{")
+    with pytest.raises(SystemExit, match="config.json is damaged"):
+        make_run(tmp_path)
+
+
+def test_unwritable_folders_are_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SystemExit, match="cannot write there"):
+        make_run(tmp_path / "file" / "run")
+
+
+def test_folder_names_say_what_is_not_default(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for changes, name in [({}, "toy-v0"), ({"colour": "blue"}, "toy-v0-colour=blue"),
+                          ({"eval_weights": (0.0, 0.25)}, "toy-v0-eval_weights=0,0.25")]:
+        args = Arguments(**changes)
+        protocol.prepare(args)
+        assert str(protocol.Run(args, "script").folder) == f"runs/script/{name}/seed1"
+
+
+def test_progress_is_shown_at_once_and_at_the_end(capsys):
+    progress = Progress("training", 1000, "steps")
+    for done in range(1, 1001):
+        progress.returns.append((1.0, -2.0))
+        progress.show(done)
+    first, *_, last = capsys.readouterr().out.splitlines()
+    assert first.startswith("training 1/1,000 steps") and last.startswith("training 1,000/1,000 steps")
+    assert "carbon +1.00, thaw -2.00" in last
+
+
+def test_summary_of_a_run_is_a_picture_and_a_table(tmp_path, capsys):
+    run_script("cleanrl_style/ppo_curriculum.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path,
+               "--total-timesteps", 80, "--num-envs", 2, "--eval-episodes", 1, "--eval-weights", 0, 0.5)
+    assert (tmp_path / "summary.png").read_bytes().startswith(b"\x89PNG")
+    lines = capsys.readouterr().out.splitlines()
+    table = lines[next(i for i, line in enumerate(lines) if line.startswith("weight")):]
+    assert [line.split()[0] for line in table[1:4]] == ["0.00", "0.50", "mean"]
+    assert {len(line.split()) for line in table[:4]} == {7}

@@ -1,0 +1,64 @@
+"""A small multi-objective environment with a known optimum, of the kind that a user would bring.
+
+Ten steps. Each step the ground is full or not, which is observed. Where it is full, planting (actions 15-24)
+is invalid and costs 1; where it is not, failing to plant costs 0.5. The mix m in {0, .25, .5, .75, 1} earns
+carbon m and thaw 1 - m^2.
+"""
+
+import gymnasium as gym
+import numpy as np
+
+LENGTH = 10
+MIXES = np.linspace(0, 1, 5)
+
+
+def optimal_return(preference: float) -> float:
+    """Scalarised return of the best policy."""
+    return LENGTH * float(np.max(preference * MIXES + (1 - preference) * (1 - MIXES**2)))
+
+
+class ToyEnv(gym.Env):
+    """Observation: preference, share of the episode gone, ground full or not.
+
+    with_site: 105 entries, the last 62 of which are drawn in every episode and mean nothing.
+    """
+
+    def __init__(self, with_site: bool = False):
+        self.size = 105 if with_site else 3
+        self.observation_space = gym.spaces.Box(0, 1, (self.size,), np.float32)
+        self.action_space = gym.spaces.Discrete(25)
+        self.reward_space = gym.spaces.Box(-2, 1, (2,), np.float32)
+        self.reward_dim = 2
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.preference = self.np_random.random()
+        if options and "preference" in options:
+            self.preference = float(options["preference"])
+        self.site = self.np_random.random(62) if self.size == 105 else np.zeros(0)
+        self.steps = 0
+        self.full = self.np_random.random() < 0.5
+        return self._observation(), {}
+
+    def _observation(self):
+        observation = np.zeros(self.size, np.float32)
+        observation[:3] = self.preference, self.steps / LENGTH, self.full
+        observation[self.size - len(self.site):] = self.site
+        return observation
+
+    def action_masks(self):
+        masks = np.ones(25, dtype=bool)
+        masks[15:] = not self.full
+        return masks
+
+    def step(self, action):
+        cost = float(not self.action_masks()[action]) + 0.5 * (action < 15 and not self.full)
+        mix = MIXES[action % 5]
+        self.steps += 1
+        self.full = self.np_random.random() < 0.5
+        reward = np.array([mix - cost, 1 - mix**2 - cost], dtype=np.float32)
+        return self._observation(), reward, self.steps == LENGTH, False, {}
+
+
+gym.register("toy-v0", entry_point="toy_env:ToyEnv")
+gym.register("toy-sites-v0", entry_point="toy_env:ToyEnv", kwargs={"with_site": True})
