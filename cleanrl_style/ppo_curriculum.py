@@ -1,0 +1,418 @@
+# Curriculum PPO: preference-conditioned PPO with a gated, masked policy, trained on a part of the episodes.
+# Without the blocks marked CURRICULUM this is gated PPO. Its skeleton is that of CleanRL's ppo.py.
+import math
+import random
+import time
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import gymnasium as gym
+import numpy as np
+import torch
+import torch.nn as nn
+import torch.optim as optim
+import tyro
+from torch.distributions.categorical import Categorical
+
+import boreal_env
+from analysis import protocol
+
+
+@dataclass
+class Args:
+    """Curriculum PPO on the boreal forest environments: trains, evaluates and leaves a run folder."""
+
+    seed: int = 1
+    """seed of the run: agent, sampling and training episodes"""
+    env_id: str | None = None
+    """boreal-generalist-v0, -balanced-v0 or -site-specific-v0, or module:id of your own (None: the mode's)"""
+    mode: Literal["generalist", "site-specific"] | None = None
+    """a new site and weather in every episode, or one fixed site (None: the environment's)"""
+    site_seed: int | None = None
+    """another fixed site, in site-specific mode"""
+    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
+    """formula of the thaw reward"""
+    total_timesteps: int | None = None
+    """steps, summed over all environments (None: 300000, in site-specific mode 100000)"""
+    num_envs: int | None = None
+    """number of environments (None: 8 async, 32 lockstep)"""
+    vectorization: Literal["async", "lockstep"] = "async"
+    """one process per environment, or all environments in one compiled call"""
+
+    # Algorithm: the paper's hyperparameters; CleanRL's where the paper is silent
+    learning_rate: float = 3e-4
+    """learning rate of Adam"""
+    rollout_steps: int = 2048
+    """steps of a rollout, summed over all environments"""
+    gamma: float = 0.99
+    """discount factor"""
+    gae_lambda: float = 0.95
+    """lambda of generalised advantage estimation"""
+    minibatch_size: int = 64
+    """largest number of transitions in a minibatch"""
+    update_epochs: int = 10
+    """passes over the rollout in an update"""
+    norm_adv: bool = True
+    """normalise the advantages in each minibatch"""
+    clip_coef: float = 0.2
+    """clipping of the policy's probability ratio"""
+    clip_vloss: bool = False
+    """clip the value loss too (clip_coef is in units of return, of which a site has tens: learning slows)"""
+    ent_coef: float = 0.01
+    """weight of the entropy bonus"""
+    vf_coef: float = 0.5
+    """weight of the value loss"""
+    max_grad_norm: float = 0.5
+    """largest norm of the gradient"""
+    # CURRICULUM
+    threshold: float = 0.5
+    """first value of the threshold tau: an episode is trained on when its site scores above it"""
+    raw_selector: bool = False
+    """score by the random network's own logit, neither centred nor scaled over sampled sites"""
+
+    # Evaluation and output
+    eval_episodes: int = 100
+    """evaluation episodes per weight"""
+    eval_weights: tuple[float, ...] = protocol.EVAL_WEIGHTS
+    """carbon weights of the evaluation"""
+    run_dir: str | None = None
+    """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
+    overwrite: bool = False
+    """start over in a folder that already holds a run"""
+
+
+def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
+    torch.nn.init.orthogonal_(layer.weight, std)
+    torch.nn.init.constant_(layer.bias, bias_const)
+    return layer
+
+
+class Agent(nn.Module):
+    """A gate chooses planting (actions 15-24) or not (0-14); each has its own head."""
+
+    def __init__(self, envs):
+        super().__init__()
+        observation_dim = np.array(envs.single_observation_space.shape).prod()
+        self.critic = nn.Sequential(
+            layer_init(nn.Linear(observation_dim, 64)),
+            nn.Tanh(),
+            layer_init(nn.Linear(64, 64)),
+            nn.Tanh(),
+            layer_init(nn.Linear(64, 1), std=1.0),
+        )
+        self.actor = nn.Sequential(
+            layer_init(nn.Linear(observation_dim, 64)),
+            nn.Tanh(),
+            layer_init(nn.Linear(64, 64)),
+            nn.Tanh(),
+        )
+        self.gate = layer_init(nn.Linear(64, 2), std=0.01)
+        self.other_head = layer_init(nn.Linear(64, 15), std=0.01)
+        self.plant_head = layer_init(nn.Linear(64, 10), std=0.01)
+
+    def get_value(self, x):
+        return self.critic(x)
+
+    def get_distribution(self, x, mask):
+        """x (n, observation), mask (n, 25) bool, at least one action valid in each row."""
+        hidden = self.actor(x)
+        other_mask, plant_mask = mask[:, :15], mask[:, 15:]
+        group_mask = torch.stack([other_mask.any(dim=1), plant_mask.any(dim=1)], dim=1)
+        # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in a group without a valid action
+        gate = torch.where(group_mask, self.gate(hidden), -1e8).log_softmax(dim=1)
+        other = torch.where(other_mask, self.other_head(hidden), -1e8).log_softmax(dim=1)
+        plant = torch.where(plant_mask, self.plant_head(hidden), -1e8).log_softmax(dim=1)
+        return Categorical(logits=torch.cat([gate[:, :1] + other, gate[:, 1:] + plant], dim=1))
+
+    def get_action_and_value(self, x, mask, action=None):
+        distribution = self.get_distribution(x, mask)
+        if action is None:
+            action = distribution.sample()
+        return action, distribution.log_prob(action), distribution.entropy(), self.critic(x)
+
+
+def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda):
+    """Advantages (steps, envs); dones[t] says that step t is the first of an episode.
+
+    The end of an episode is terminal: nothing is worth anything beyond it, so nothing is bootstrapped.
+    """
+    advantages = torch.zeros_like(rewards)
+    lastgaelam = 0
+    for t in reversed(range(len(rewards))):
+        last = t == len(rewards) - 1
+        nextnonterminal = 1.0 - (next_done if last else dones[t + 1])
+        nextvalues = next_value if last else values[t + 1]
+        delta = rewards[t] + gamma * nextvalues * nextnonterminal - values[t]
+        advantages[t] = lastgaelam = delta + gamma * gae_lambda * nextnonterminal * lastgaelam
+    return advantages
+
+
+# CURRICULUM
+class Curriculum:
+    """Chooses the episodes to train on: those whose site a fixed random network scores above a threshold.
+
+    Environments without the 62 site observations (site-specific mode) have all their episodes accepted.
+    """
+
+    NUM_SITE_INPUTS = 62
+
+    def __init__(self, observation_dim, seed, threshold, raw):
+        self.threshold = threshold
+        self.accepts_all = observation_dim != len(boreal_env.OBSERVATION_NAMES)
+        # a generator of its own: the agent is the one that ppo_gated starts from
+        generator = np.random.default_rng(seed)
+        sizes = (self.NUM_SITE_INPUTS, 64, 64, 1)
+        self.layers = [generator.normal(0, n**-0.5, (n, m)) for n, m in zip(sizes, sizes[1:])]
+        self.mean, self.std = 0.0, 1.0
+        if not raw and not self.accepts_all:
+            logits = self.logit(boreal_env.sample_site_observations(range(1000)))
+            self.mean, self.std = logits.mean(), logits.std()
+        # sum and number of the returns seen so far in each tenth of the preference
+        self.decile_sum, self.decile_count = np.zeros(10), np.zeros(10)
+        self.finished = []
+
+    def logit(self, sites):
+        for layer in self.layers[:-1]:
+            sites = np.tanh(sites @ layer)
+        return (sites @ self.layers[-1])[:, 0]
+
+    def score(self, observations):
+        """Score in [0, 1] of the site of each observation (n, observation)."""
+        if self.accepts_all:
+            return np.ones(len(observations))
+        logits = self.logit(observations[:, -self.NUM_SITE_INPUTS:].astype(np.float64))
+        return 1 / (1 + np.exp(-(logits - self.mean) / self.std))
+
+    def update_threshold(self):
+        """Once a rollout: lower the threshold if its selected episodes did better than its skipped ones.
+
+        Each return is taken less the running mean of its preference's decile (this rollout's included), since
+        the preference sets the level of a return. Gives the numbers of selected and of skipped episodes.
+        """
+        preferences, returns, selected = np.array(self.finished).reshape(-1, 3).T
+        selected = selected.astype(bool)
+        deciles = np.minimum(10 * preferences, 9).astype(int)
+        np.add.at(self.decile_sum, deciles, returns)
+        np.add.at(self.decile_count, deciles, 1)
+        if selected.any() and not selected.all():
+            excess = returns - self.decile_sum[deciles] / self.decile_count[deciles]
+            better = excess[selected].mean() > excess[~selected].mean()
+            self.threshold *= 0.999 if better else 1.001
+        self.finished = []
+        return selected.sum(), (~selected).sum()
+
+
+if __name__ == "__main__":
+    args = tyro.cli(Args)
+    env_kwargs = protocol.prepare(args)
+    episode_columns = protocol.EPISODE_COLUMNS
+    update_columns = ("iteration", "global_step", "policy_loss", "value_loss", "entropy", "old_approx_kl",
+                      "approx_kl", "clip_fraction", "explained_variance")
+    # CURRICULUM
+    episode_columns += ("score", "threshold", "selected")
+    update_columns += ("threshold", "selected_episodes", "skipped_episodes", "selected_transitions")
+
+    run = protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns)
+
+    # TRY NOT TO MODIFY: seeding
+    random.seed(args.seed)
+    np.random.seed(args.seed)
+    torch.manual_seed(args.seed)
+    torch.set_num_threads(1)
+
+    # env setup
+    if args.env_id in protocol.MODES:
+        boreal_env.warm_up()  # compile once, before the workers are forked
+    make_env = partial(gym.make, args.env_id, disable_env_checker=True, **env_kwargs)
+    if args.vectorization == "async":
+        envs = gym.vector.AsyncVectorEnv([make_env] * args.num_envs,
+                                         autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
+    else:
+        envs = gym.make_vec(args.env_id, num_envs=args.num_envs, **env_kwargs)
+
+    agent = Agent(envs)
+    optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+
+    # TRY NOT TO MODIFY: start the game
+    global_step, episode = 0, 0
+    start_seed = args.seed * protocol.MAX_ENVS
+    next_obs, _ = envs.reset(seed=[start_seed + i for i in range(args.num_envs)])
+    next_done = np.zeros(args.num_envs, dtype=bool)
+    episode_returns = np.zeros((args.num_envs, 2))
+    # CURRICULUM: of the episode under way in each environment
+    curriculum = Curriculum(next_obs.shape[1], args.seed, args.threshold, args.raw_selector)
+    scores, thresholds = curriculum.score(next_obs), np.full(args.num_envs, curriculum.threshold)
+    selected = scores > thresholds
+
+    # every environment makes the same number of steps, so num_envs may leave a few of the total over
+    steps_per_env = args.total_timesteps // args.num_envs
+    rollout_length = args.rollout_steps // args.num_envs
+    num_iterations = math.ceil(steps_per_env / rollout_length)
+    progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps")
+
+    for iteration in range(1, num_iterations + 1):
+        # ALGO Logic: Storage setup (the last rollout may be shorter)
+        num_steps = min(rollout_length, steps_per_env - global_step // args.num_envs)
+        obs = torch.zeros((num_steps, args.num_envs) + envs.single_observation_space.shape)
+        masks = torch.zeros((num_steps, args.num_envs, 25), dtype=torch.bool)
+        actions = torch.zeros((num_steps, args.num_envs), dtype=torch.long)
+        logprobs = torch.zeros((num_steps, args.num_envs))
+        rewards = torch.zeros((num_steps, args.num_envs))
+        dones = torch.zeros((num_steps, args.num_envs))
+        values = torch.zeros((num_steps, args.num_envs))
+        rollout_start, env_seconds = time.perf_counter(), 0.0
+        # CURRICULUM
+        selecteds = torch.zeros((num_steps, args.num_envs), dtype=torch.bool)
+
+        for step in range(num_steps):
+            global_step += args.num_envs
+            obs[step] = torch.from_numpy(next_obs)
+            masks[step] = torch.from_numpy(protocol.action_masks(envs, next_obs, args.env_id))
+            dones[step] = torch.from_numpy(next_done)
+            # CURRICULUM
+            selecteds[step] = torch.from_numpy(selected)
+
+            # ALGO LOGIC: action logic
+            with torch.no_grad():
+                action, logprob, _, value = agent.get_action_and_value(obs[step], masks[step])
+                values[step] = value.flatten()
+            actions[step] = action
+            logprobs[step] = logprob
+
+            # TRY NOT TO MODIFY: execute the game and log data.
+            preferences = next_obs[:, 0].astype(np.float64)
+            env_start = time.perf_counter()
+            next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
+            env_seconds += time.perf_counter() - env_start
+            next_done = terminations | truncations
+            episode_returns += reward
+            scalarized = protocol.scalarize(reward[:, 0], reward[:, 1], preferences)
+            rewards[step] = torch.from_numpy(scalarized)
+
+            for i in np.flatnonzero(next_done):
+                episode += 1
+                carbon, thaw = episode_returns[i]
+                scalarized_return = protocol.scalarize(carbon, thaw, preferences[i])
+                row = {"global_step": global_step, "episode": episode, "env": i, "preference": preferences[i],
+                       "carbon_return": carbon, "thaw_return": thaw, "scalarized_return": scalarized_return,
+                       **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO))}
+                # CURRICULUM: note the episode that ended, choose whether to train on the one that begins
+                row |= {"score": scores[i], "threshold": thresholds[i], "selected": int(selected[i])}
+                curriculum.finished.append((preferences[i], scalarized_return, selected[i]))
+                scores[i], thresholds[i] = curriculum.score(next_obs[i : i + 1])[0], curriculum.threshold
+                selected[i] = scores[i] > thresholds[i]
+
+                run.log("episodes", row)
+                progress.returns.append((carbon, thaw))
+                episode_returns[i] = 0
+            progress.show(global_step)
+        run.time("environment", global_step, env_seconds)
+        run.time("rollout", global_step, time.perf_counter() - rollout_start)
+        update_start = time.perf_counter()
+
+        # advantages, and bootstrap values of the episodes that the rollout cuts
+        with torch.no_grad():
+            next_value = agent.get_value(torch.from_numpy(next_obs)).flatten()
+        last_done = torch.from_numpy(next_done).float()
+        advantages = compute_gae(rewards, values, dones, next_value, last_done, args.gamma, args.gae_lambda)
+        returns = advantages + values
+
+        # flatten the batch
+        b_obs = obs.flatten(0, 1)
+        b_masks = masks.flatten(0, 1)
+        b_logprobs = logprobs.flatten()
+        b_actions = actions.flatten()
+        b_advantages = advantages.flatten()
+        b_returns = returns.flatten()
+        b_values = values.flatten()
+        b_inds = np.arange(num_steps * args.num_envs)
+        # CURRICULUM: skipped episodes are in no gradient; a rollout without selected ones has no update
+        b_inds = b_inds[selecteds.flatten().numpy()]
+
+        # Optimizing the policy and value network
+        num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
+        losses = []
+        y_pred, y_true = b_values[b_inds], b_returns[b_inds]
+        for epoch in range(args.update_epochs):
+            np.random.shuffle(b_inds)
+            for minibatch in range(num_minibatches):
+                mb_inds = b_inds[minibatch::num_minibatches]
+                _, newlogprob, entropy, newvalue = agent.get_action_and_value(
+                    b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds]
+                )
+                logratio = newlogprob - b_logprobs[mb_inds]
+                ratio = logratio.exp()
+
+                mb_advantages = b_advantages[mb_inds]
+                if args.norm_adv and len(mb_inds) > 1:
+                    mb_advantages = (mb_advantages - mb_advantages.mean()) / (mb_advantages.std() + 1e-8)
+
+                # Policy loss
+                pg_loss1 = -mb_advantages * ratio
+                pg_loss2 = -mb_advantages * torch.clamp(ratio, 1 - args.clip_coef, 1 + args.clip_coef)
+                pg_loss = torch.max(pg_loss1, pg_loss2).mean()
+
+                # Value loss
+                newvalue = newvalue.view(-1)
+                v_loss = (newvalue - b_returns[mb_inds]) ** 2
+                if args.clip_vloss:
+                    v_clipped = b_values[mb_inds] + torch.clamp(
+                        newvalue - b_values[mb_inds], -args.clip_coef, args.clip_coef
+                    )
+                    v_loss = torch.max(v_loss, (v_clipped - b_returns[mb_inds]) ** 2)
+                v_loss = 0.5 * v_loss.mean()
+
+                entropy_loss = entropy.mean()
+                loss = pg_loss - args.ent_coef * entropy_loss + args.vf_coef * v_loss
+
+                optimizer.zero_grad()
+                loss.backward()
+                nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
+                optimizer.step()
+
+                with torch.no_grad():
+                    # http://joschu.net/blog/kl-approx.html
+                    old_kl, kl = -logratio.mean(), (ratio - 1 - logratio).mean()
+                    clipfrac = ((ratio - 1).abs() > args.clip_coef).float().mean()
+                    losses.append(torch.stack([pg_loss, v_loss, entropy_loss, old_kl, kl, clipfrac]).numpy())
+
+        # TRY NOT TO MODIFY: record the update; means over its minibatches
+        row = {"iteration": iteration, "global_step": global_step}
+        if losses:
+            row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0)))
+            row["explained_variance"] = (1 - (y_true - y_pred).var() / y_true.var()).item()
+        # CURRICULUM: the threshold of the next rollout's episodes
+        num_selected, num_skipped = curriculum.update_threshold()
+        row |= {"threshold": curriculum.threshold, "selected_episodes": num_selected,
+                "skipped_episodes": num_skipped, "selected_transitions": len(b_inds)}
+
+        run.log("updates", row)
+        run.time("update", global_step, time.perf_counter() - update_start)
+
+        checkpoint = {
+            "agent": agent.state_dict(), "optimizer": optimizer.state_dict(),
+            "iteration": iteration, "global_step": global_step, "episode": episode,
+            "next_obs": next_obs, "next_done": next_done, "episode_returns": episode_returns,
+            "random_states": (random.getstate(), np.random.get_state(), torch.get_rng_state()),
+            "envs": protocol.environment_state(envs, args.env_id), "table_sizes": run.table_sizes(),
+        }
+        # CURRICULUM
+        checkpoint |= {"curriculum": vars(curriculum), "scores": scores, "thresholds": thresholds,
+                       "selected": selected}
+
+        with protocol.replacing(run.folder / "checkpoint.pt") as file:
+            torch.save(checkpoint, file)
+
+    envs.close()
+
+    def action_probabilities(observations, masks, accrued_returns):
+        with torch.no_grad():
+            distribution = agent.get_distribution(torch.from_numpy(observations), torch.from_numpy(masks))
+        return distribution.probs.numpy()
+
+    evaluation_start = time.perf_counter()
+    evaluation, years = protocol.evaluate(args, env_kwargs, action_probabilities)
+    run.time("evaluation", global_step, time.perf_counter() - evaluation_start)
+    run.finish(evaluation, years)

@@ -1,0 +1,297 @@
+import json
+import os
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from scripts import ROOT, run_script
+from toy_env import optimal_return
+
+import boreal_env
+from analysis import protocol
+from cleanrl_style.ppo_curriculum import Agent, Args, Curriculum, compute_gae
+
+SCRIPT = "cleanrl_style/ppo_curriculum.py"
+OBSERVATIONS = 105
+
+
+def make_agent(seed=0):
+    torch.manual_seed(seed)
+    return Agent(SimpleNamespace(single_observation_space=gym.spaces.Box(0, 1, (OBSERVATIONS,))))
+
+
+def train(folder, *arguments, env_id="toy_env:toy-sites-v0"):
+    run_script(SCRIPT, "--env-id", env_id, "--run-dir", folder, "--total-timesteps", 640, "--num-envs", 4,
+               "--rollout-steps", 256, "--eval-episodes", 2, "--eval-weights", 0, 1, *arguments)
+
+
+@pytest.fixture(scope="module")
+def finished_run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "first"
+    train(folder)
+    return folder
+
+
+# -------------------------------------------------------------------------------------------------- agent
+
+
+def test_joint_probabilities_are_gate_times_head_and_sum_to_one():
+    agent = make_agent()
+    x, mask = torch.randn(6, OBSERVATIONS), torch.rand(6, 25) < 0.5
+    mask[:, 12] = mask[:, 20] = True
+    probabilities = agent.get_distribution(x, mask).probs.detach()
+    torch.testing.assert_close(probabilities.sum(dim=1), torch.ones(6))
+    assert (probabilities[~mask] == 0).all()
+    hidden = agent.actor(x)
+    gate = agent.gate(hidden).softmax(dim=1)
+    heads = [agent.other_head(hidden).exp() * mask[:, :15], agent.plant_head(hidden).exp() * mask[:, 15:]]
+    expected = [gate[:, [k]] * head / head.sum(dim=1, keepdim=True) for k, head in enumerate(heads)]
+    torch.testing.assert_close(probabilities, torch.cat(expected, dim=1).detach())
+
+
+@pytest.mark.parametrize("valid", [slice(0, 15), slice(15, 25), slice(24, 25)])
+def test_a_group_without_a_valid_action_leaves_all_to_the_other(valid):
+    agent = make_agent()
+    mask = torch.zeros(3, 25, dtype=torch.bool)
+    mask[:, valid] = True
+    action, logprob, entropy, _ = agent.get_action_and_value(torch.randn(3, OBSERVATIONS), mask)
+    probabilities = agent.get_distribution(torch.randn(3, OBSERVATIONS), mask).probs
+    torch.testing.assert_close(probabilities[:, valid].sum(dim=1), torch.ones(3))
+    assert mask.gather(1, action[:, None]).all()
+    assert torch.isfinite(logprob).all() and torch.isfinite(entropy).all()
+
+
+def test_masked_actions_give_no_gradient():
+    agent = make_agent()
+    mask = torch.ones(1, 25, dtype=torch.bool)
+    mask[:, 15:] = False
+    _, logprob, entropy, _ = agent.get_action_and_value(torch.randn(1, OBSERVATIONS), mask, torch.tensor([3]))
+    (logprob + entropy).sum().backward()
+    assert not agent.plant_head.weight.grad.any()
+    assert not agent.gate.weight.grad.any()
+    assert agent.other_head.weight.grad.any()
+
+
+def test_gae_of_a_hand_computed_episode():
+    # gamma and lambda 0.5; an episode of three steps (rewards 1, 2, 4, values 1, 2, 3), then the next one
+    rewards = torch.tensor([[1.0], [2.0], [4.0], [8.0]])
+    values = torch.tensor([[1.0], [2.0], [3.0], [5.0]])
+    dones = torch.tensor([[1.0], [0.0], [0.0], [1.0]])
+    # the end is terminal: delta_2 = 4 - 3 = 1; delta_1 = 2 + 1.5 - 2 = 1.5; delta_0 = 1 + 1 - 1 = 1
+    # A_2 = 1; A_1 = 1.5 + .25 * 1 = 1.75; A_0 = 1 + .25 * 1.75 = 1.4375
+    # the rollout cuts the second episode: bootstrapped with the value 10: 8 + 5 - 5 = 8
+    advantages = compute_gae(rewards, values, dones, torch.tensor([10.0]), torch.tensor([0.0]), 0.5, 0.5)
+    torch.testing.assert_close(advantages.flatten(), torch.tensor([1.4375, 1.75, 1.0, 8.0]))
+    # the same, had the second episode ended there: no bootstrap
+    advantages = compute_gae(rewards, values, dones, torch.tensor([10.0]), torch.tensor([1.0]), 0.5, 0.5)
+    torch.testing.assert_close(advantages.flatten(), torch.tensor([1.4375, 1.75, 1.0, 3.0]))
+
+
+# --------------------------------------------------------------------------------------------- curriculum
+
+
+def make_curriculum(raw=False, seed=1, size=OBSERVATIONS):
+    return Curriculum(size, seed, 0.5, raw)
+
+
+def test_scores_are_centred_and_scaled_over_sampled_sites():
+    observations = np.zeros((1000, OBSERVATIONS), np.float32)
+    observations[:, -62:] = boreal_env.sample_site_observations(range(1000))
+    for seed in range(5):
+        scores = make_curriculum(seed=seed).score(observations)
+        logits = np.log(scores / (1 - scores))
+        assert logits.mean() == pytest.approx(0, abs=1e-6)
+        assert logits.std() == pytest.approx(1, abs=1e-6)
+        assert 0.35 < (scores > 0.5).mean() < 0.65
+
+
+def test_raw_scores_are_the_networks_own():
+    observations = np.random.default_rng(0).random((50, OBSERVATIONS)).astype(np.float32)
+    raw = make_curriculum(raw=True)
+    sites = observations[:, -62:].astype(np.float64)
+    np.testing.assert_allclose(raw.score(observations), 1 / (1 + np.exp(-raw.logit(sites))))
+    assert not np.allclose(raw.score(observations), make_curriculum().score(observations))
+
+
+def test_the_selector_sees_only_the_site():
+    curriculum = make_curriculum()
+    observations = np.random.default_rng(0).random((2, OBSERVATIONS)).astype(np.float32)
+    observations[1, -62:] = observations[0, -62:]
+    assert np.ptp(curriculum.score(observations)) < 1e-12
+
+
+def test_without_site_observations_every_episode_is_accepted():
+    assert (make_curriculum(size=43).score(np.zeros((4, 43), np.float32)) > 0.5).all()
+
+
+@pytest.mark.parametrize("finished, factor", [
+    ([(0.5, 2.0, True), (0.5, 1.0, False)], 0.999),
+    ([(0.5, 1.0, True), (0.5, 2.0, False)], 1.001),
+    ([(0.5, 1.0, True), (0.5, 1.0, False)], 1.001),
+    ([(0.5, 1.0, True), (0.5, 2.0, True)], 1),
+    ([(0.5, 1.0, False)], 1),
+    ([], 1),
+])
+def test_threshold_rule(finished, factor):
+    curriculum = make_curriculum()
+    curriculum.finished = finished
+    counts = curriculum.update_threshold()
+    assert curriculum.threshold == 0.5 * factor
+    assert counts == (sum(s for *_, s in finished), sum(not s for *_, s in finished))
+
+
+def test_returns_are_compared_within_their_preference_decile():
+    curriculum = make_curriculum()
+    # preference .95 earns about 10, preference .05 about 0: the selected episode did worse for its preference
+    curriculum.finished = [(0.95, 10.0, True), (0.95, 12.0, False), (0.05, 0.0, False), (0.05, 0.0, False)]
+    curriculum.update_threshold()
+    assert curriculum.threshold == 0.5 * 1.001
+    # the running mean remembers: decile 9 stands at 11, so a selected 11.5 is good and a skipped 0 neutral
+    curriculum.finished = [(1.0, 11.5, True), (0.0, 0.0, False)]
+    curriculum.update_threshold()
+    assert curriculum.threshold == 0.5 * 1.001 * 0.999
+
+
+def test_skipped_episodes_are_in_no_gradient(tmp_path):
+    train(tmp_path, "--threshold", 1)
+    trained = torch.load(tmp_path / "checkpoint.pt", weights_only=False)["agent"]
+    initial = make_agent(seed=1).state_dict()
+    assert all(torch.equal(trained[name], initial[name]) for name in initial)
+    updates = pd.read_csv(tmp_path / "updates.csv")
+    assert updates.selected_transitions.tolist() == [0, 0, 0]
+    assert updates.policy_loss.isna().all()
+
+
+def test_updates_use_exactly_the_steps_of_selected_episodes(finished_run):
+    episodes, updates = (pd.read_csv(finished_run / f"{name}.csv") for name in ("episodes", "updates"))
+    # 640 steps of 4 environments are 160 each: 16 episodes of 10 steps; rollouts end at steps 64, 128, 160
+    assert len(episodes) == 64 and updates.global_step.tolist() == [256, 512, 640]
+    steps = {rollout: 0 for rollout in (64, 128, 160)}
+    for _, rows in episodes.groupby("env"):
+        for k, selected in enumerate(rows.selected):
+            for step in range(10 * k, 10 * k + 10):
+                steps[next(end for end in steps if step < end)] += selected
+    assert updates.selected_transitions.tolist() == list(steps.values())
+    assert ((episodes.score > episodes.threshold) == episodes.selected).all()
+    assert 0 < episodes.selected.mean() < 1
+    assert episodes.score.nunique() == len(episodes)
+
+
+def test_episodes_are_scored_by_their_own_site(tmp_path):
+    train(tmp_path, "--total-timesteps", 400, "--vectorization", "lockstep", "--eval-episodes", 1,
+          env_id="boreal-generalist-v0")
+    episodes = pd.read_csv(tmp_path / "episodes.csv")
+    observations = np.zeros((len(episodes), OBSERVATIONS), np.float32)
+    observations[:, -62:] = boreal_env.sample_site_observations(episodes.site_seed)
+    assert len(episodes) == 8
+    np.testing.assert_allclose(episodes.score, make_curriculum().score(observations), rtol=1e-6)
+    filled = {"final_density", "mean_density", "final_conifer_fraction", "mean_conifer_fraction"}
+    assert episodes[list(filled)].gt(0).all(axis=None)
+
+
+def test_threshold_path_follows_from_the_episodes(finished_run):
+    episodes, updates = (pd.read_csv(finished_run / f"{name}.csv") for name in ("episodes", "updates"))
+    curriculum, start = make_curriculum(), 0
+    for _, update in updates.iterrows():
+        ended = episodes[(episodes.global_step > start) & (episodes.global_step <= update.global_step)]
+        curriculum.finished = list(zip(ended.preference, ended.scalarized_return, ended.selected))
+        curriculum.update_threshold()
+        assert update.threshold == pytest.approx(curriculum.threshold, rel=1e-8)
+        start = update.global_step
+
+
+# ------------------------------------------------------------------------------------------------- script
+
+
+def test_same_command_twice_gives_the_same_bytes(finished_run, tmp_path):
+    train(tmp_path / "second")
+    names = {path.name for path in finished_run.iterdir()}
+    assert names == {"config.json", "episodes.csv", "updates.csv", "evaluation.csv", "timing.csv",
+                     "checkpoint.pt", "summary.png"}
+    for name in names - {"timing.csv"}:
+        assert (finished_run / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
+
+
+def test_another_seed_gives_another_run(finished_run, tmp_path):
+    train(tmp_path / "second", "--seed", 2)
+    assert (finished_run / "episodes.csv").read_bytes() != (tmp_path / "second" / "episodes.csv").read_bytes()
+
+
+def test_a_finished_run_is_left_alone(finished_run, capsys):
+    before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in finished_run.iterdir()}
+    with pytest.raises(SystemExit) as exit:
+        train(finished_run)
+    assert exit.value.code == 0
+    assert "finished" in capsys.readouterr().out
+    assert before == {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in finished_run.iterdir()}
+
+
+def test_learns_the_toy(tmp_path):
+    train(tmp_path, "--total-timesteps", 24_000, "--num-envs", 8, "--rollout-steps", 1024, "--learning-rate",
+          0.002, "--eval-episodes", 10, "--eval-weights", 0, 0.5, 1, env_id="toy_env:toy-v0")
+    evaluation = pd.read_csv(tmp_path / "evaluation.csv")
+    returns = evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean()
+    for weight in (0.0, 0.5, 1.0):
+        assert returns[weight] > 0.95 * optimal_return(weight)
+
+
+@pytest.mark.parametrize("arguments, message", [
+    (["--eval-weights", "0", "1.5"], "--eval-weights must lie in [0, 1], not 1.5"),
+    (["--eval-weights", "nan"], "--eval-weights must lie in [0, 1], not nan"),
+    (["--eval-weights", "0", "0"], "none twice"),
+    (["--eval-episodes", "0"], "--eval-episodes must lie in [1, "),
+    (["--env-id", "forest-v0"], "forest"),
+    (["--env-id", "no_such_module:forest-v0"], "no_such_module"),
+    (["--env-id", "CartPole-v1"], "Discrete(25)"),
+    (["--num-envs", "7"], "multiple of --num-envs 7"),
+    (["--num-envs", "0"], "--num-envs must lie in [1, 1000], not 0"),
+    (["--total-timesteps", "3"], "--total-timesteps 3"),
+    (["--seed", "-1"], "--seed must lie in [0, 999999], not -1"),
+    (["--gamma", "1.1"], "--gamma must lie in [0, 1], not 1.1"),
+    (["--mode", "site-specific", "--env-id", "boreal-generalist-v0"], "contradicts"),
+    (["--mode", "generalist", "--env-id", "boreal_env:boreal-site-specific-v0"], "contradicts"),
+    (["--site-seed", "3"], "--site-seed is for --mode site-specific"),
+    (["--thaw-formulation", "contrast", "--env-id", "toy_env:toy-v0"], "not for --env-id toy_env:toy-v0"),
+    (["--vectorization", "lockstep", "--env-id", "toy_env:toy-v0"], "no vector entry point"),
+])
+def test_bad_arguments_leave_nothing_behind(arguments, message, tmp_path):
+    with pytest.raises(SystemExit, match="^error: ") as exit:
+        run_script(SCRIPT, "--run-dir", tmp_path / "run", *arguments)
+    assert message in str(exit.value) and "\n" not in str(exit.value)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("arguments", [["--mode", "specialist"], ["--run-dir", "/dev/null/run"]])
+def test_refusal_on_the_command_line(arguments, tmp_path):
+    command = [sys.executable, ROOT / SCRIPT, "--env-id", "toy_env:toy-v0", *arguments]
+    path = os.pathsep.join([str(ROOT), str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")])
+    result = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path,
+                            env={**os.environ, "PYTHONPATH": path})
+    assert result.returncode != 0
+    assert arguments[1] in result.stderr and "Traceback" not in result.stderr
+    assert result.stdout == "" and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("given, env_id, mode, steps, envs", [
+    ({}, "boreal-generalist-v0", "generalist", 300_000, 8),
+    ({"mode": "site-specific"}, "boreal-site-specific-v0", "site-specific", 100_000, 8),
+    ({"env_id": "boreal-site-specific-v0"}, "boreal-site-specific-v0", "site-specific", 100_000, 8),
+    ({"env_id": "boreal_env:boreal-generalist-v0"}, "boreal-generalist-v0", "generalist", 300_000, 8),
+    ({"env_id": "boreal-balanced-v0"}, "boreal-balanced-v0", "generalist", 300_000, 8),
+    ({"vectorization": "lockstep"}, "boreal-generalist-v0", "generalist", 300_000, 32),
+])
+def test_defaults_that_depend_on_others(given, env_id, mode, steps, envs):
+    args = Args(**given)
+    protocol.resolve(args)
+    assert (args.env_id, args.mode, args.total_timesteps, args.num_envs) == (env_id, mode, steps, envs)
+
+
+def test_configuration_names_no_place(finished_run):
+    config = json.loads((finished_run / "config.json").read_text())
+    assert config["arguments"]["env_id"] == "toy_env:toy-sites-v0" and config["arguments"]["gamma"] == 0.99
+    assert "run_dir" not in config["arguments"] and str(finished_run.parent) not in json.dumps(config)
