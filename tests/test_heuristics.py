@@ -1,0 +1,60 @@
+import numpy as np
+import pandas as pd
+import pytest
+from scripts import run_script
+
+from analysis import evaluation, protocol
+from baselines_heuristic import Args, conifer_restoration, plus_100, target_density, zero_change
+
+SCRIPTS = ("zero_change", "plus_100", "target_density", "conifer_restoration")
+
+
+def observe(*densities):
+    observations = np.zeros((len(densities), 105), np.float32)
+    observations[:, 2] = np.array(densities) / 1500
+    return observations
+
+
+def test_fixed_actions():
+    assert zero_change.policy(observe(0, 1500)).tolist() == [12, 12]
+    assert plus_100.policy(observe(0, 1500)).tolist() == [22, 22]
+
+
+@pytest.mark.parametrize("density, change", [
+    (0, 100), (900, 100), (924, 100), (926, 50), (974, 50), (976, 0), (1000, 0), (1024, 0), (1026, -50),
+    (1074, -50), (1076, -100), (1900, -100),
+])
+def test_target_density(density, change):
+    index = (-100, -50, 0, 50, 100).index(change)
+    assert target_density.policy(observe(density)).tolist() == [5 * index + 2]
+    assert conifer_restoration.policy(observe(density)).tolist() == [5 * index + 4]
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_run_folder(script, tmp_path):
+    run_script(f"baselines_heuristic/{script}.py", "--run-dir", tmp_path, "--eval-episodes", 2,
+               "--eval-weights", 0, 0.25, 1)
+    names = {"config.json", "evaluation.csv", "evaluation_years.csv", "summary.png", "timing.csv"}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    episodes = pd.read_csv(tmp_path / "evaluation.csv")
+    assert tuple(episodes.columns) == evaluation.EVALUATION_COLUMNS
+    assert episodes.groupby(["policy", "preference"]).size().tolist() == [2] * 6
+    years = pd.read_csv(tmp_path / "evaluation_years.csv")
+    assert years.groupby(["policy", "preference", "year", "variable"]).size().eq(1).all()
+
+
+def test_one_simulation_stands_for_every_weight(tmp_path):
+    run_script("baselines_heuristic/target_density.py", "--run-dir", tmp_path, "--eval-episodes", 2,
+               "--eval-weights", 0, 0.7)
+    written = pd.read_csv(tmp_path / "evaluation.csv")
+    args = Args(eval_episodes=2, eval_weights=(0.0, 0.7))
+    simulated, _ = protocol.evaluate(args, protocol.prepare(args), lambda observations, masks, returns:
+                                     np.eye(25)[target_density.policy(observations)])
+    pd.testing.assert_frame_equal(written, simulated, rtol=1e-8, check_dtype=False)
+
+
+def test_users_environments_are_refused(tmp_path):
+    with pytest.raises(SystemExit, match="--env-id must be one of"):
+        run_script("baselines_heuristic/zero_change.py", "--env-id", "toy_env:toy-v0", "--run-dir",
+                   tmp_path / "run")
+    assert not (tmp_path / "run").exists()
