@@ -491,9 +491,12 @@ def _check_choice(what, value, allowed) -> None:
         raise ValueError(f"{what} {value!r}: allowed are {', '.join(allowed)}")
 
 
-def warm_up() -> None:
-    """Compile the physics, or load it from the disk cache, so that processes forked later find it ready."""
-    compile_kernels()
+def warm_up(num_envs: int = 1) -> None:
+    """Compile the physics for `num_envs` stands in lockstep, or load it from the disk cache.
+
+    Called before worker processes are forked (with 1: each has one stand), it saves each of them the compilation.
+    """
+    compile_kernels(num_envs)
 
 
 # ---------------------------------------------------------------------------------------------------------------

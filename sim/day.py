@@ -44,9 +44,9 @@ def begin_day(b, day, observed):
         observed_weather(b, observed)
     else:
         generated_weather(b, day)
-    canopy_structure(b, day)
     for i in range(len(b.s.swe)):
         fire(b, day, i)
+    canopy_structure(b, day)
     litter(b, day)
     clear_day(b)
 

@@ -1,11 +1,13 @@
 """How the physics is compiled, and how the same source runs uncompiled.
 
-Every process function carries `@compiled`. IEEE arithmetic is strict (no fastmath), so that one stand and
-sixteen stands in lockstep give the same bits; `error_model="numpy"` drops the zero check of each division,
-without which no loop over stands is vectorised.
+Process functions carry `@compiled`; functions that loop over the lanes of a block carry `@phase`. IEEE arithmetic is
+strict (no fastmath), so that one stand and sixteen stands in lockstep give the same bits; `error_model="numpy"` drops
+the zero check of each division, and `forceinline` the calls, without which no loop over lanes is vectorised.
 
-numba keys its disk cache by the caller's own file and misses a change in a callee of another file. The cache
-folder is therefore named by a hash of all of `sim/`.
+Two faults of numba's disk cache are worked around here. It keys by the caller's own file and misses a change in a
+callee of another file: the cache folder is named by a hash of all of `sim/`. And it names compiled code by counters
+of the compiling process, so that kernels for one and for sixteen lanes, compiled by two processes, are taken for each
+other in a third: each number of lanes gets functions with names of their own.
 """
 import functools
 import hashlib
@@ -16,8 +18,10 @@ from pathlib import Path
 import numba
 from numba.core.dispatcher import Dispatcher
 
-compiled = numba.njit(error_model="numpy", nogil=True, forceinline=True)
-phase = numba.njit(error_model="numpy", nogil=True)
+OPTIONS = {"error_model": "numpy", "nogil": True}
+
+compiled = numba.njit(**OPTIONS, forceinline=True)
+phase = numba.njit(**OPTIONS)
 
 
 @functools.cache
@@ -31,26 +35,38 @@ def cache_folder() -> Path:
     return base / digest.hexdigest()[:16]
 
 
-def compiled_and_cached(function):
-    """`@compiled` for the entry points of `sim`, kept on disk between runs."""
+def specialised(dispatcher: Dispatcher, name: str):
+    """A copy of a compiled function and of all that it calls, under names that end in `name`, cached on disk."""
     previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(cache_folder())
     try:
-        return numba.njit(error_model="numpy", nogil=True, cache=True)(function)
+        copy = _copy(dispatcher, {}, lambda function, original: _recompiled(function, original, name))
+        return numba.njit(**OPTIONS, cache=True)(copy.py_func)
     finally:
         numba.config.CACHE_DIR = previous
 
 
-def uncompiled(dispatcher: Dispatcher, _copies: dict | None = None):
+def uncompiled(dispatcher: Dispatcher):
     """The Python function behind a compiled one, calling the Python functions behind all that it calls.
 
     This is the `python` backend: the same source, executed by the interpreter.
     """
-    copies = {} if _copies is None else _copies
+    return _copy(dispatcher, {}, lambda function, original: function)
+
+
+def _recompiled(function, original, name):
+    function.__qualname__ = f"{function.__qualname__}_{name}"
+    return compiled(function) if original.targetoptions.get("forceinline") else phase(function)
+
+
+def _copy(dispatcher, copies, wrap):
+    """A function with globals of its own, in which every compiled function is a copy too."""
     if dispatcher not in copies:
         source = dispatcher.py_func
         namespace = dict(source.__globals__)
-        copies[dispatcher] = types.FunctionType(source.__code__, namespace, source.__name__, source.__defaults__)
+        function = types.FunctionType(source.__code__, namespace, source.__name__, source.__defaults__)
+        function.__qualname__, function.__module__ = source.__qualname__, source.__module__
+        copies[dispatcher] = wrap(function, dispatcher)
         for name in source.__code__.co_names:
             if isinstance(namespace.get(name), Dispatcher):
-                namespace[name] = uncompiled(namespace[name], copies)
+                namespace[name] = _copy(namespace[name], copies, wrap)
     return copies[dispatcher]

@@ -4,6 +4,7 @@ Each stand's parameters, state, draws and record are rows of four arrays, (stand
 sixteen stands into the lanes of a block, calls the compiled kernel, and copies them back; blocks run on a pool of
 threads. So any subset of stands can be stepped together, in any order, with the same bits.
 """
+import functools
 import os
 from concurrent.futures import ThreadPoolExecutor
 from numbers import Real
@@ -13,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.demography import AGE_CLASSES, AGES, SAPLING_LIMIT, SEEDLING_LIMIT
-from sim.jit import uncompiled
+from sim.jit import specialised, uncompiled
 from sim.management import NUM_ACTIONS, decode
 from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS, check_constants, check_mechanisms
 from sim.spin_up import (
@@ -224,7 +225,7 @@ class Stands:
                 observed, days, rows, steps_per_day or self.steps_per_day,
             )  # fmt: skip
 
-        chunks = blocks(len(stands), self.threads)
+        chunks = blocks(len(stands))
         if len(chunks) == 1 or self.backend == "python":
             for chunk in chunks:
                 run(chunk)
@@ -252,7 +253,7 @@ class Stands:
         forcing = np.zeros((0, 6, lanes)) if observed is None else np.repeat(observed[:, :, None], lanes, axis=2)
         output = np.zeros((0 if daily is None else days, len(DAILY), lanes))
         if self.backend == "numba":
-            simulate_year(block[0], steps_per_day, days, forcing, output)
+            kernel(lanes)(block[0], steps_per_day, days, forcing, output)
         else:
             with np.errstate(all="ignore"):
                 uncompiled(simulate_year)(_namespace(block[0]), steps_per_day, days, forcing, output)
@@ -295,7 +296,7 @@ HELD_IN_SPIN_UP = (
 )  # fmt: skip
 
 
-def blocks(number: int, threads: int) -> list[slice]:
+def blocks(number: int) -> list[slice]:
     """Split stands into calls of the kernel: blocks of sixteen lanes; a few stands go one by one."""
     if number < LANES // 2:
         return [slice(k, k + 1) for k in range(number)]
@@ -384,8 +385,14 @@ def _positive_integer(name, value) -> int:
     return int(value)
 
 
-def compile_kernels() -> None:
-    """Compile the year kernel for one and for sixteen lanes, or load both from the disk cache."""
-    for lanes in (1, LANES):
+@functools.cache
+def kernel(lanes: int):
+    """The year kernel for blocks of this many lanes, compiled at its first call or loaded from the disk cache."""
+    return specialised(simulate_year, f"{lanes}_lanes")
+
+
+def compile_kernels(number: int) -> None:
+    """Have the kernels ready that so many stands need, so that processes forked later find them."""
+    for lanes in sorted({LANES if b.stop - b.start > 1 else 1 for b in blocks(number)}):
         block = np.zeros(1, block_dtype(lanes))[0]
-        simulate_year(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes)))
+        kernel(lanes)(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes)))

@@ -41,6 +41,7 @@ from sim.weather import (
 )
 
 NO_CAP = 1e3  # degC
+PSYCHROMETRIC_OVER_ICE = PSYCHROMETRIC_PER_HPA * LATENT_HEAT_VAPORISATION / LATENT_HEAT_SUBLIMATION
 THIN_SNOW_MM = 0.1  # less does not hold the ground at 0 degC: it melts with little of the step's heat
 
 
@@ -57,7 +58,7 @@ def simulate_step(b, t, cos_hour, sin_hour, sun_up, seconds, observed):
         generated_air(b, cos_hour, sin_hour, seconds)
     stores_before(b)
     if sun_up:
-        sunlight(b, t, cos_hour, observed)
+        sunlight(b, t, cos_hour, seconds, observed)
     else:
         darkness(b)
     if any_snow(b):
@@ -137,7 +138,7 @@ def snowfall(b, seconds):
         net = w.canopy_sw[i] + w.longwave_cover[i] * (w.sky[i] + ground_emission - 2.0 * air_emission)
         lost = snow_sublimation(
             store, capacity, p.sublimation_exposure[i], net, w.canopy_air[i], w.deficit[i],
-            saturation_slope(w.air[i], w.saturation[i]), PSYCHROMETRIC_PER_HPA * p.air_pressure_hpa[i],
+            saturation_slope(w.air[i], w.saturation[i]), PSYCHROMETRIC_OVER_ICE * p.air_pressure_hpa[i],
             LATENT_HEAT_SUBLIMATION, seconds,
         )  # fmt: skip
         store -= lost
@@ -187,7 +188,7 @@ def rainfall(b):
 
 
 @phase
-def sunlight(b, t, cos_hour, observed):
+def sunlight(b, t, cos_hour, seconds, observed):
     """Shortwave absorbed by canopy and ground, and photosynthesis."""
     s, p, w = b.s, b.p, b.w
     if observed.shape[0] > 0:
@@ -209,7 +210,7 @@ def sunlight(b, t, cos_hour, observed):
             w.shortwave[i], w.diffuse[i], beam_conifer, beam_deciduous, w.sky_conifer[i], w.sky_deciduous[i],
             p.albedo_conifer[i], p.albedo_deciduous[i], ground,
         )  # fmt: skip
-        stress = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i])
+        stress = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds)
         dry_conifer = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], p.vpd_high_conifer_hpa[i])
         dry_deciduous = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], p.vpd_high_deciduous_hpa[i])
         w.gpp_conifer[i] = photosynthesis(
@@ -274,7 +275,7 @@ def conductances(b, seconds):
         # so that the ground's equation and what is moved agree.
         drying = max(SATURATION_AT_FREEZING_HPA - w.vapour[i], 1e-3)
         transfer = min(w.vapour_density[i] * velocity, s.swe[i] / (seconds * drying))
-        stress = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i])
+        stress = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds)
         sky_and_canopy = longwave_down(w.sky[i], black_body(w.air[i] + FREEZING_POINT_K), w.longwave_cover[i])
         available = w.ground_sw[i] + p.ground_emissivity[i] * (sky_and_canopy - emission)
         moist = p.priestley_taylor_ground[i] * equilibrium * stress if w.air[i] > 0.0 else 0.0

@@ -1,11 +1,16 @@
 """Soil water: one bucket. Amounts in mm."""
 from sim.jit import compiled
 
+LARGEST_EVAPORATION = 4e-4  # mm s-1, the latent heat of 1000 W m-2
+
 
 @compiled
-def water_stress(water, capacity, threshold) -> float:
-    """Share of unstressed evaporation and photosynthesis: 1 above `threshold` of capacity, 0 in dry soil."""
-    return min(water / (threshold * capacity), 1.0)
+def water_stress(water, capacity, threshold, seconds) -> float:
+    """Share of unstressed evaporation and photosynthesis: 1 above `threshold` of capacity, 0 in dry soil.
+
+    The ramp is longer by what one step can evaporate at the most, so that no step takes more than there is.
+    """
+    return min(water / (threshold * capacity + LARGEST_EVAPORATION * seconds), 1.0)
 
 
 @compiled

@@ -17,7 +17,7 @@ from sim.demography import (
     self_thinning,
 )
 from sim.disturbance import between, outbreak_probability
-from sim.jit import compiled_and_cached, phase
+from sim.jit import phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
 from sim.snow import LATENT_HEAT_FUSION
 from sim.soil import organic_layer, thaw_depth
@@ -29,7 +29,7 @@ WATER_DENSITY = 1000.0  # kg m-3
 LEAST_TRUNK_CAPACITY = 2000.0  # J m-2 K-1
 
 
-@compiled_and_cached
+@phase
 def simulate_year(b, steps_per_day, days, observed, daily):
     """Advance a block of stands by a year, in place.
 
