@@ -1,0 +1,84 @@
+"""Measures the one constant of `boreal-balanced-v0`: the carbon scale at which both returns vary equally.
+
+Reference policies, the 25 constant actions (no change where an action is not valid) and the four fixed
+strategies, play the same sites and weathers. The spread of a return is its standard deviation between the policies of one site, pooled over sites. Carbon
+counts as the net change over the carbon scale, before penalties and clipping, so that its spread is in
+proportion to 1 / carbon_scale; thaw as rewarded.
+"""
+
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import tyro
+
+import boreal_env
+from analysis.evaluation import final_info
+from baselines_heuristic import conifer_restoration, plus_100, target_density, zero_change
+
+FIRST_SEED = 2_000_000_000  # met neither in training nor in evaluation
+
+
+@dataclass
+class Args:
+    """Prints the carbon scale that equalises the within-site standard deviation of both returns."""
+
+    sites: int = 40
+    """sites, each with one start and weather, the same for every policy"""
+    years: int = 50
+    """length of an episode"""
+
+
+def reference_policies() -> dict:
+    """Name -> function of observations (n, d) that gives actions (n,)."""
+    constant = {f"action {a}": lambda observations, a=a: where_valid(observations, a) for a in range(25)}
+    strategies = (zero_change, plus_100, target_density, conifer_restoration)
+    return constant | {strategy.__name__.rsplit(".")[-1]: strategy.policy for strategy in strategies}
+
+
+def where_valid(observations: np.ndarray, action: int) -> np.ndarray:
+    """The action where it can be carried out in full, no change elsewhere; observations (n, d), actions (n,)."""
+    return np.where(boreal_env.action_masks(observations)[:, action], action, boreal_env.NO_CHANGE)
+
+
+def play(args: Args, **reward) -> np.ndarray:
+    """Net carbon change [kgC m-2], carbon and thaw return of every episode, shape (policies, sites, 3)."""
+    seeds = [FIRST_SEED + site for site in range(args.sites)]
+    envs = boreal_env.BorealVectorEnv(args.sites, years=args.years, record_years=True, reward=reward)
+    columns = ("net_carbon_change_kgc_m2", "carbon_reward", "thaw_reward")
+    sums = []
+    for policy in reference_policies().values():
+        observations, _ = envs.reset(seed=seeds)
+        for _ in range(args.years):
+            observations, _, _, _, infos = envs.step(policy(observations))
+        years = [final_info(infos, site, ["years"])["years"] for site in range(args.sites)]
+        sums.append([[record[name].sum() for name in columns] for record in years])
+    return np.array(sums)
+
+
+def within_site_spread(sums: np.ndarray) -> np.ndarray:
+    """Standard deviation between a site's policies, pooled over sites; (policies, sites, n) to (n,)."""
+    return np.sqrt(sums.var(axis=0).mean(axis=0))
+
+
+def main(args: Args) -> None:
+    """Play every policy on every site, and print the spreads and the scale that makes them equal."""
+    if args.sites < 1 or not 1 <= args.years <= 1000:
+        sys.exit(f"error: --sites >= 1, --years 1 to 1000 are allowed, not {args.sites}, {args.years}")
+    paper = boreal_env.Reward().carbon_scale
+    sums = play(args)
+    print("mean over the sites   change/scale   carbon     thaw")
+    for name, (change, carbon, thaw) in zip(reference_policies(), sums.mean(axis=1), strict=True):
+        print(f"{name:20s} {change / paper:+13.3f} {carbon:+8.2f} {thaw:+8.2f}")
+    change, carbon, thaw = within_site_spread(sums)
+    scale = float(f"{change / thaw:.2g}")
+    print(f"\nwithin-site standard deviations: {len(sums)} policies, {args.sites} sites, {args.years} years")
+    print(f"at carbon_scale {paper:g}: change/scale {change / paper:.4f}, thaw {thaw:.4f}, ratio "
+          f"{change / paper / thaw:.4f}; carbon return with penalties {carbon:.3f}")  # fmt: skip
+    print(f"balanced carbon_scale: {change / thaw:.4f}, to two digits {scale:g} kgC m-2 yr-1")
+    carbon = within_site_spread(play(args, carbon_scale=scale))[1]
+    print(f"at carbon_scale {scale:g}: carbon return with penalties and clipping {carbon:.3f}")
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Args))

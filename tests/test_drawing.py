@@ -1,0 +1,100 @@
+import itertools
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.wrappers import RenderCollection
+
+import boreal_env
+from analysis.drawing import HEIGHT, WIDTH
+
+NO_FIRE = {"fire": False, "insects": False}
+
+
+@pytest.fixture
+def env():
+    return boreal_env.BorealEnv(render_mode="rgb_array", mechanisms=NO_FIRE)
+
+
+def test_picture_of_every_year(env):
+    env.reset(seed=3)
+    first = env.render()
+    assert first.shape == (HEIGHT, WIDTH, 3) and first.dtype == np.uint8
+    assert first.std() > 20.0
+    env.step(22)
+    second = env.render()
+    assert second.shape == first.shape
+    assert (first != second).any()
+
+
+def test_same_state_gives_the_same_pixels_and_drawing_changes_nothing(env):
+    def play(draw_every_year):
+        env.reset(seed=5)
+        for _ in range(3):
+            if draw_every_year:
+                env.render()
+            observation = env.step(22)[0]
+        return env.render(), env.render(), observation
+
+    first, again, observation = play(False)
+    drawn, _, drawn_observation = play(True)
+    assert np.array_equal(first, again) and np.array_equal(first, drawn)
+    assert np.array_equal(observation, drawn_observation)
+
+
+def test_trees_show_density_and_species(env):
+    def colours(density, conifers):
+        env.reset(seed=1)
+        stands = env.unwrapped._episodes.stands
+        stands.start(
+            [0],
+            [boreal_env.sim.sample_site(1)],
+            stands.seeds,
+            {0: {"density_stems_ha": density, "conifer_fraction": conifers, "oldest_age_years": 80.0}},
+        )
+        scene = env.render()[60:300, :500].astype(int)
+        red, green, blue = scene[..., 0], scene[..., 1], scene[..., 2]
+        return int((green > red + 40).sum()), int((red > blue + 80).sum())
+
+    green_few, gold_few = colours(200.0, 0.5)
+    green_many, gold_many = colours(1500.0, 0.5)
+    assert green_many > 2 * green_few > 0 and gold_many > 2 * gold_few > 0
+    assert colours(1500.0, 1.0)[1] == 0 and colours(1500.0, 0.0)[0] == 0
+    assert colours(0.0, 0.5) == (0, 0)
+
+
+def test_burnt_and_empty_stands_can_be_drawn():
+    always = {"fire_base_probability": 0.05, "fire_drought_threshold": 0.0}
+    env = boreal_env.BorealEnv(
+        render_mode="rgb_array", parameter_overrides=always, record_years=True, years=10
+    )
+    env.reset(seed=2)
+    pictures = [env.render()]
+    terminated = False
+    while not terminated:
+        *_, terminated, _, info = env.step(24)
+        pictures.append(env.render())
+    assert (info["years"]["fire_mortality"] > 0.0).any()
+    assert len({picture.tobytes() for picture in pictures}) == 11
+
+    bare = boreal_env.BorealEnv(render_mode="rgb_array", initial_ranges={"density_stems_ha": (0.0, 0.0)})
+    bare.reset(seed=2)
+    assert bare.render().shape == (HEIGHT, WIDTH, 3)
+
+
+def test_without_render_mode_nothing_is_drawn():
+    env = boreal_env.BorealEnv()
+    env.reset(seed=1)
+    assert env.render() is None
+
+
+def test_frames_of_a_video():
+    """As `RecordVideo` collects them, which needs moviepy to write them."""
+    env = RenderCollection(gym.make("boreal-generalist-v0", render_mode="rgb_array", years=3))
+    env.reset(seed=1)
+    for _ in range(3):
+        env.step(12)
+    frames = env.render()
+    assert len(frames) == 4
+    assert all(frame.shape == (HEIGHT, WIDTH, 3) and frame.dtype == np.uint8 for frame in frames)
+    assert all((one != other).any() for one, other in itertools.pairwise(frames))
