@@ -97,9 +97,11 @@ def generated_weather(b, day):
         probability = p.winter_snow_prob[i] if winter else probability
         mean = p.winter_snow_mm_day[i] if winter else mean
         sensitivity = p.winter_precip_temp_sensitivity[i] if winter else sensitivity
-        base = p.snowfall_base_temperature_c[i] if winter else base
-        departure = temperature - base
-        departure = min(departure, 0.0) * p.snowfall_limit[i] if winter else departure
+        # Rain follows the temperature of the season; snowfall that of the day's weather: cold spells are dry, but
+        # January is not drier than November.
+        departure = w.anomaly[i] * p.snowfall_limit[i] if winter else temperature - base
+        scale = 1.0 + p.snowfall_limit[i] * (p.snowfall_scale[i] - 1.0)
+        mean = mean * scale if winter else mean
         precipitation = daily_precipitation(
             d.wet_dice[day, i], d.wet_amount[day, i], probability, mean, sensitivity, departure
         )
@@ -184,7 +186,7 @@ def canopy_structure(b, day):
         w.snow_area[i] = w.cover_conifer[i] * area_conifer + w.cover_deciduous[i] * area_deciduous
 
         sky_conifer, sky_deciduous = canopy_interception(
-            1.0, w.crown_area[i], w.share_conifer[i], w.optical_conifer[i], w.optical_deciduous[i]
+            p.sky_path[i], w.crown_area[i], w.share_conifer[i], w.optical_conifer[i], w.optical_deciduous[i]
         )
         cover = sky_conifer + sky_deciduous
         w.sky_conifer[i] = sky_conifer

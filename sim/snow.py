@@ -11,6 +11,7 @@ LATENT_HEAT_VAPORISATION = 2.5e6  # J kg-1
 LATENT_HEAT_SUBLIMATION = LATENT_HEAT_FUSION + LATENT_HEAT_VAPORISATION
 AIR_HEAT_CAPACITY = 1005.0  # J kg-1 K-1
 GRAVITY = 9.81  # m s-2
+MELTING_FROM_C = -0.01  # a melting pack is at 0 degC only to rounding
 
 
 @compiled
@@ -31,7 +32,7 @@ def conductivity(density: float) -> float:
 @compiled
 def snow_albedo(albedo, temperature, snowfall, fresh, old, cold_hours, melt_hours, refresh, seconds) -> float:
     """Albedo after a step (FSM2): falls toward `old`, faster while melting; snowfall [mm] renews it."""
-    hours = melt_hours if temperature >= 0.0 else cold_hours
+    hours = melt_hours if temperature > MELTING_FROM_C else cold_hours
     ageing = seconds / (3600.0 * hours)
     renewal = snowfall / refresh
     return (albedo + ageing * old + renewal * fresh) / (1.0 + ageing + renewal)

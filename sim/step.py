@@ -225,8 +225,9 @@ def sunlight(b, t, cos_hour, seconds, observed):
 
         # Stomata open in light and above freezing; a lane in the dark is as in `darkness`, whatever its neighbours.
         open_stomata = 1.0 if w.air[i] > 0.0 and w.shortwave[i] > 0.0 else 0.0
-        leaves = w.transpiration_conifer[i] * dry_conifer + w.transpiration_deciduous[i] * dry_deciduous
-        w.leaf_coefficient[i] = leaves * stress * open_stomata
+        conifer = w.transpiration_conifer[i] * dry_conifer * w.temperature_stress_conifer[i]
+        deciduous = w.transpiration_deciduous[i] * dry_deciduous * w.temperature_stress_deciduous[i]
+        w.leaf_coefficient[i] = (conifer + deciduous) * stress * open_stomata
 
 
 @phase

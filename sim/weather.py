@@ -96,7 +96,8 @@ def precipitation_season(
 def daily_precipitation(dice, amount, probability, mean, sensitivity, departure) -> float:
     """Precipitation of the day [mm]: `mean` x an exponential deviate `amount` on a wet day, scaled by temperature.
 
-    departure : degrees from the season's base temperature; rain grows above it (convection), snowfall shrinks below.
+    departure : degrees of a rainy day from its season's base temperature (convection), of a snow day from the
+    climate's mean for the date.
     """
     return mean * amount * exponential(sensitivity * departure) if dice < probability else 0.0
 
