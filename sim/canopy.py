@@ -54,7 +54,7 @@ def stress_ramp(value, zero, one) -> float:
 @compiled
 def canopy_balance(
     canopy, fixed, shortwave_absorbed, sky, cover, ground_emissivity,
-    ground, ground_cap, ground_base, ground_by_emission, ground_by_canopy,
+    ground, melt_span, ground_base, ground_by_emission, ground_by_canopy,
     trunk_base, trunk_by_canopy, trunk_by_ground, trunk_conductance,
     air, air_conductance, dry_coefficient, wet_coefficient, wet_limit,
 ):  # fmt: skip
@@ -62,7 +62,8 @@ def canopy_balance(
 
     canopy : trial canopy temperature [degC]; fixed : energy used by photosynthesis, snow melt and sublimation
     [W m-2]; ground : temperature of the ground at the start of the step [degC], about which its emission is
-    linear; ground_cap : 0 degC where snow lies; ground_* and trunk_* : how the two answer to the canopy.
+    linear; melt_span : how much warmer [K] the ground would be if its snow, all of which it takes to melt, were not
+    there (0 without snow); ground_*, trunk_* : how the two answer to the canopy.
     dry_coefficient, wet_coefficient : evaporation per net radiation; wet_limit : the intercepted rain, as a flux.
     Returns (residual [W m-2], its slope [W m-2 K-1], net radiation, ground temperature [degC]).
     """
@@ -73,8 +74,10 @@ def canopy_balance(
     ground_slope = black_body_slope(ground_kelvin)
 
     free_ground = ground_base + ground_by_emission * emission + ground_by_canopy * canopy
-    new_ground = min(free_ground, ground_cap)
-    answer = ground_by_emission * emission_slope + ground_by_canopy if free_ground < ground_cap else 0.0
+    # Below 0 degC, at 0 degC while snow melts, above it when the last snow has melted within the step.
+    new_ground = min(free_ground, 0.0) + max(free_ground - melt_span, 0.0)
+    melting = 0.0 < free_ground and free_ground < melt_span
+    answer = 0.0 if melting else ground_by_emission * emission_slope + ground_by_canopy
     trunk = trunk_base + trunk_by_canopy * canopy + trunk_by_ground * new_ground
 
     up = longwave_up(

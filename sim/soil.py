@@ -70,7 +70,8 @@ def respond_to_canopy(
     W m-2 K-1. Every node's balance is linear (the ground's emission about its old temperature), so each is a line
     in the temperature of the node above it; what remains is the canopy's own equation.
     Returns the coefficients (deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base,
-    trunk_by_canopy, trunk_by_ground, ground_base, ground_by_emission, ground_by_canopy).
+    trunk_by_canopy, trunk_by_ground, ground_base, ground_by_emission, ground_by_canopy) and the ground's stiffness
+    [W m-2 K-1].
     """
     whole = deep_inertia + surface_deep + deep_boundary
     deep_base = (deep_inertia * deep + deep_boundary * boundary) / whole
@@ -105,7 +106,7 @@ def respond_to_canopy(
     ground_by_canopy = trunk_ground * trunk_by_canopy / whole
     return (
         deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base, trunk_by_canopy, trunk_by_ground,
-        ground_base, ground_by_emission, ground_by_canopy,
+        ground_base, ground_by_emission, ground_by_canopy, whole,
     )  # fmt: skip
 
 

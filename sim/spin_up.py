@@ -20,6 +20,7 @@ enthalpy = uncompiled(soil.enthalpy)
 SPIN_UP_YEARS = 8
 SPIN_UP_STEPS_PER_DAY = 12
 LONGEST_LEAP = 15.0  # years
+SEASONAL_RANGE_K = 4.0
 GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
 
 #: Ranges that the first stocks are drawn from.
@@ -161,17 +162,28 @@ def climate_draws() -> dict[str, np.ndarray]:
     return {"wet_dice": evenly, "wet_amount": np.ones(DAYS), "fire_dice": np.ones(DAYS)}
 
 
-def next_deep_heat(heat, gain, heat_before, gain_before) -> np.ndarray:
+def deep_heat_limits(parameters: dict, surface_temperature: float) -> tuple[float, float]:
+    """Range of the deep soil's enthalpy [J m-2] on 1 January: its mean lies between the surface soil's and the
+    boundary's, and the season moves it by less than `SEASONAL_RANGE_K` from that."""
+    boundary = parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K
+    low, high = sorted((surface_temperature, boundary))
+    node = soil_node(parameters, "deep")
+    return enthalpy(low - SEASONAL_RANGE_K, *node), enthalpy(high + SEASONAL_RANGE_K, *node)
+
+
+def next_deep_heat(heat, gain, heat_before, gain_before, limits) -> np.ndarray:
     """Deep-soil enthalpy [J m-2] to start the next year of spin-up with, so that the deep soil comes to gain nothing.
 
     heat, gain : enthalpy at the start of the year just run, and what the year added; *_before : of the year before,
-    or None. A secant step, no longer than `LONGEST_LEAP` years of the gain; shape (stands,) each.
+    or None; shape (stands,) each; limits : (stands, 2). A secant step, no longer than `LONGEST_LEAP` years of the
+    gain, kept within the limits.
     """
     if heat_before is None:
-        return heat + gain
+        return np.clip(heat + gain, *limits.T)
     steepness = gain - gain_before
     moved = heat - heat_before
     falling = steepness * moved < 0.0
     secant = -gain * moved / np.where(falling, steepness, 1.0)
     longest = LONGEST_LEAP * np.abs(gain)
-    return heat + np.where(falling, np.clip(secant, -longest, longest), np.sign(gain) * longest)
+    leap = np.where(falling, np.clip(secant, -longest, longest), np.sign(gain) * longest)
+    return np.clip(heat + leap, *limits.T)

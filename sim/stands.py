@@ -22,6 +22,7 @@ from sim.spin_up import (
     SPIN_UP_STEPS_PER_DAY,
     SPIN_UP_YEARS,
     climate_draws,
+    deep_heat_limits,
     first_state,
     next_deep_heat,
 )
@@ -132,7 +133,7 @@ class Stands:
         """Bring soil, snow and water into balance with the site, with the stand held as it is."""
         first = self.state[stands].copy()
         held = [STATE_NAMES.index(name) for name in HELD_IN_SPIN_UP] + list(range(len(STATE), STATE_SIZE))
-        deep = STATE_NAMES.index("deep_heat")
+        deep, surface = STATE_NAMES.index("deep_heat"), RECORD_NAMES.index("surface_soil_temperature_c")
         draws = np.zeros((len(stands), DRAWS_SIZE))
         for name, values in climate_draws().items():
             draws[:, _draw_slice(name)] = values
@@ -146,7 +147,11 @@ class Stands:
             state[:, held] = first[:, held]
             gain = state[:, deep] - heat
             if year > 0:  # the first year only lays the snow
-                state[:, deep] = next_deep_heat(heat, gain, heat_before, gain_before)
+                limits = [
+                    deep_heat_limits(dict(zip(PARAMETER_NAMES, self.parameters[stand], strict=True)), temperature)
+                    for stand, temperature in zip(stands, record[:, surface], strict=True)
+                ]
+                state[:, deep] = next_deep_heat(heat, gain, heat_before, gain_before, np.array(limits))
                 heat_before, gain_before = heat, gain
             self.state[stands] = state
 

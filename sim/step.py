@@ -40,9 +40,7 @@ from sim.weather import (
     snow_share,
 )
 
-NO_CAP = 1e3  # degC
 PSYCHROMETRIC_OVER_ICE = PSYCHROMETRIC_PER_HPA * LATENT_HEAT_VAPORISATION / LATENT_HEAT_SUBLIMATION
-THIN_SNOW_MM = 0.1  # less does not hold the ground at 0 degC: it melts with little of the step's heat
 
 
 @phase
@@ -283,8 +281,7 @@ def conductances(b, seconds):
         w.ground_latent[i] = (
             LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.vapour[i]) if snow else moist * max(available, 0.0)
         )
-        deep_snow = s.swe[i] > THIN_SNOW_MM
-        w.latent_slope[i] = LATENT_HEAT_SUBLIMATION * transfer * ice_slope if deep_snow else 0.0
+        w.latent_slope[i] = LATENT_HEAT_SUBLIMATION * transfer * ice_slope if snow else 0.0
 
         w.surface[i] = temperature(
             s.surface_heat[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], p.soil_freezing_range_k[i]
@@ -322,11 +319,10 @@ def conductances(b, seconds):
             heat_capacity(w.deep[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], p.soil_freezing_range_k[i])
             / seconds
         )
-        w.cap[i] = 0.0 if deep_snow else NO_CAP
         (
             w.deep_base[i], w.deep_by_surface[i], w.surface_base[i], w.surface_by_ground[i], w.trunk_base[i],
             w.trunk_by_canopy[i], w.trunk_by_ground[i], w.ground_base[i], w.ground_by_emission[i],
-            w.ground_by_canopy[i],
+            w.ground_by_canopy[i], stiffness,
         ) = respond_to_canopy(
             s.trunk[i], s.trunk_capacity[i] / seconds, w.trunk_canopy[i], w.trunk_air[i], w.trunk_ground[i],
             s.ground[i], (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) / seconds, w.ground_conductance[i],
@@ -336,6 +332,7 @@ def conductances(b, seconds):
             w.deep[i], deep_inertia, w.deep_conductance[i], w.boundary_conductance[i],
             p.deep_boundary_temperature_k[i] - FREEZING_POINT_K,
         )  # fmt: skip
+        w.melt_span[i] = LATENT_HEAT_FUSION * s.swe[i] / (seconds * stiffness)
         w.trial[i] = s.canopy[i]
         w.low[i] = w.air[i] - 100.0
         w.high[i] = w.air[i] + 100.0
@@ -348,7 +345,7 @@ def canopy_residual(b):
     for i in range(len(s.swe)):
         w.residual[i], w.slope[i], w.net[i], w.ground_new[i] = canopy_balance(
             w.trial[i], w.fixed[i], w.canopy_sw[i], w.sky[i], w.longwave_cover[i], p.ground_emissivity[i],
-            s.ground[i], w.cap[i], w.ground_base[i], w.ground_by_emission[i], w.ground_by_canopy[i],
+            s.ground[i], w.melt_span[i], w.ground_base[i], w.ground_by_emission[i], w.ground_by_canopy[i],
             w.trunk_base[i], w.trunk_by_canopy[i], w.trunk_by_ground[i], w.trunk_canopy[i],
             w.air[i], w.canopy_air[i], w.dry_coefficient[i], w.wet_coefficient[i], w.wet_limit[i],
         )  # fmt: skip
@@ -412,7 +409,7 @@ def move_energy_and_water(b, seconds):
         latent = (LATENT_HEAT_SUBLIMATION * sublimated + LATENT_HEAT_VAPORISATION * soil_evaporated) / seconds
 
         # The ground's enthalpy: snow that sublimates takes its own sensible heat along; what would warm snow above
-        # 0 degC melts it; what is left after the last snow goes with the meltwater into the soil.
+        # 0 degC melts it; what is left after the last snow warms the skin.
         carried = ICE_HEAT_CAPACITY * sublimated * s.ground[i]
         heat = (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) * s.ground[i] - carried
         heat += seconds * (
@@ -423,13 +420,11 @@ def move_energy_and_water(b, seconds):
         melted = min(max(heat, 0.0) / LATENT_HEAT_FUSION, s.swe[i]) if snow else 0.0
         heat -= LATENT_HEAT_FUSION * melted
         s.swe[i] -= melted
-        percolated = max(heat, 0.0) if w.cap[i] == 0.0 else 0.0
-        heat -= percolated
         s.ground[i] = heat / (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i])
 
         s.canopy[i] = canopy
         s.trunk[i] += seconds * (canopy_to_trunk - trunk_heat - trunk_to_ground) / s.trunk_capacity[i]
-        s.surface_heat[i] += seconds * (ground_to_surface - surface_to_deep) + percolated
+        s.surface_heat[i] += seconds * (ground_to_surface - surface_to_deep)
         s.deep_heat[i] += seconds * (surface_to_deep - deep_to_boundary)
 
         s.canopy_rain[i] = max(s.canopy_rain[i] - evaporated, 0.0)
