@@ -3,6 +3,7 @@
 `import boreal_env` registers `boreal-generalist-v0`, `boreal-site-specific-v0` and `boreal-balanced-v0`.
 The file reads top to bottom: observation, action mask, reward, episodes, the environment, the vector environment.
 """
+import inspect
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 
@@ -391,7 +392,8 @@ class _Episodes:
             "ground_shortwave_mj_m2": mean("ground_shortwave_mj_m2"),
         }
         if self.record_years:
-            info["years"] = {name: years[:, k].copy() for name, k in _HISTORY.items()}
+            record = {name: years[:, k].copy() for name, k in _HISTORY.items()}
+            info["years"] = {"year": np.arange(1, len(years) + 1), **record}
         return info
 
     def _observe_start(self, indices, sites) -> None:
@@ -455,15 +457,18 @@ class _Episodes:
     def get_state(self) -> dict:
         """All that the future depends on."""
         names = ("preference", "site_seeds", "episode_seeds", "year", "running", "history", "_observation")
-        return {"stands": self.stands.get_state(), **{name: getattr(self, name).copy() for name in names}}
+        state = {name: getattr(self, name).copy() for name in names}
+        return {"mode": self.mode, "stands": self.stands.get_state(), **state}
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
-        if state["history"].shape != self.history.shape:
-            raise ValueError(f"state of episodes {state['history'].shape[:2]} given to {self.history.shape[:2]}")
+        there, here = ((kind, *history.shape[:2]) for kind, history in
+                       ((state["mode"], state["history"]), (self.mode, self.history)))  # fmt: skip
+        if there != here:
+            raise ValueError(f"state of (mode, episodes, years) {there} given to {here}")
         self.stands.set_state(state["stands"])
         for name, value in state.items():
-            if name != "stands":
+            if name not in ("mode", "stands"):
                 setattr(self, name, value.copy())
 
 
@@ -484,6 +489,17 @@ def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict
         if name not in allowed:
             raise ValueError(f"unknown reset option {name!r}; allowed: {', '.join(allowed)}")
     return dict(options or {})
+
+
+ARGUMENTS = tuple(name for name in inspect.signature(_Episodes).parameters if name != "number")
+
+
+def _known(arguments: dict) -> dict:
+    """Arguments of an environment, all of which it has."""
+    for name in arguments:
+        if name not in ARGUMENTS:
+            raise ValueError(f"unknown argument {name!r}; allowed: {', '.join(ARGUMENTS)}, render_mode")
+    return arguments
 
 
 def _check_choice(what, value, allowed) -> None:
@@ -566,7 +582,7 @@ class BorealEnv(gym.Env, EzPickle):
         if render_mode is not None:
             _check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self._episodes = _Episodes(1, **kwargs)
+        self._episodes = _Episodes(1, **_known(kwargs))
         self.observation_space = observation_space(self._episodes.entries)
         self.action_space = Discrete(NUM_ACTIONS)
         self.reward_space = Box(-1.0, 1.0, (2,), np.float32)
@@ -574,11 +590,11 @@ class BorealEnv(gym.Env, EzPickle):
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Start an episode. options: "preference" (weight of carbon) and "site" (parameter -> value)."""
-        super().reset(seed=seed)
         options = check_reset_options(options)
         preference, site = options.get("preference"), options.get("site")
         preference = None if preference is None else check_preference(preference)
         sim.middle_site(site)
+        super().reset(seed=None if seed is None else check_seed("seed", seed))
         self._episodes.begin([0], [self._episodes.draw(self.np_random)], [preference], [site])
         return self._episodes.observations()[0], {}
 
@@ -641,7 +657,7 @@ class BorealVectorEnv(VectorEnv):
         if num_envs % group_size:
             raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
         self.num_envs, self.group_size = int(num_envs), int(group_size)
-        self._episodes = _Episodes(self.num_envs, **kwargs)
+        self._episodes = _Episodes(self.num_envs, **_known(kwargs))
         self.single_observation_space = observation_space(self._episodes.entries)
         self.single_action_space = Discrete(NUM_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -691,6 +707,11 @@ class BorealVectorEnv(VectorEnv):
     def action_masks(self) -> np.ndarray:
         """Actions that can be carried out in full, bool, shape (num_envs, 25)."""
         return action_masks(self._episodes._observation.astype(np.float32), self._episodes.harvest_min_class)
+
+    def call(self, name: str, *args, **kwargs) -> tuple:
+        """A method of every environment, as with gymnasium's AsyncVectorEnv: here `action_masks` only."""
+        _check_choice("method", name, ("action_masks",))
+        return tuple(self.action_masks())
 
     def get_state(self) -> dict:
         """Everything the future depends on, generators included; picklable."""

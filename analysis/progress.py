@@ -1,5 +1,6 @@
 """The progress line."""
 
+import shutil
 import sys
 import time
 from collections import deque
@@ -32,8 +33,9 @@ class Progress:
                 f"{(self.total - done) / rate / 60:.1f} min left")
         if self.returns:
             carbon, thaw = np.mean(self.returns, axis=0)
-            line += f", last {len(self.returns)} episodes: carbon {carbon:+.2f}, thaw {thaw:+.2f}"
+            line += f", carbon {carbon:+.2f}, thaw {thaw:+.2f}"
         if self.terminal:
-            print("\r" + line.ljust(110), end="\n" if done >= self.total else "", flush=True)
+            width = shutil.get_terminal_size().columns - 1
+            print("\r" + line[:width].ljust(width), end="\n" if done >= self.total else "", flush=True)
         else:
             print(line, flush=True)

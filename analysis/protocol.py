@@ -7,6 +7,7 @@ ends with `evaluate` and `run.finish`.
 import contextlib
 import csv
 import importlib.metadata
+import io
 import json
 import os
 import platform
@@ -18,6 +19,7 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pandas as pd
+import tyro
 
 from analysis.evaluation import (  # noqa: F401 (the scripts' one import)
     EVAL_WEIGHTS,
@@ -70,11 +72,28 @@ def fail(message: str):
     sys.exit(f"error: {message}")
 
 
+def parse(arguments: type):
+    """The command line as an instance of `arguments`; a bad flag or value ends the script with one line."""
+    errors = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(errors):
+            return tyro.cli(arguments)
+    except SystemExit as end:
+        if not end.code:
+            raise
+    # tyro draws a box: its message, a rule, then help on the flag
+    lines = [line.strip("│ ") for line in errors.getvalue().splitlines() if line.startswith("│")]
+    rules = [i for i, line in enumerate(lines) if line.startswith("─")]
+    fail(" ".join(lines[: rules[0] if rules else None]) or errors.getvalue().strip())
+
+
 def resolve(args) -> None:
     """Fill in, in place, the arguments whose default depends on another one."""
     if args.env_id is None:
         args.env_id = "boreal-site-specific-v0" if args.mode == "site-specific" else "boreal-generalist-v0"
     args.env_id = args.env_id.removeprefix("boreal_env:")
+    if args.env_id not in MODES and args.env_id + "-v0" in MODES:
+        fail(f"--env-id {args.env_id}: give the version, {args.env_id}-v0")
     if args.mode is None:
         args.mode = MODES.get(args.env_id, "generalist")
     if getattr(args, "total_timesteps", 0) is None:
@@ -93,7 +112,7 @@ def prepare(args) -> dict:
         given = getattr(args, name, None)
         for value in given if isinstance(given, tuple) else (given,):
             if value is not None and not low <= value <= high:
-                fail(f"--{name.replace('_', '-')} must lie in [{low:.10g}, {high:.10g}], not {value:.10g}")
+                fail(f"--{name.replace('_', '-')} must lie in [{low}, {high}], not {value}")
     if not args.eval_weights or len(set(args.eval_weights)) < len(args.eval_weights):
         fail("--eval-weights must name at least one weight, and none twice")
 
@@ -119,11 +138,13 @@ def prepare(args) -> dict:
 
 def check_environment(args, env_kwargs: dict) -> None:
     """Exit with one line unless the environment exists and is of the kind that the scripts can handle."""
+    allowed = f"allowed: {', '.join(MODES)}, or module:id of an environment of yours"
+    if args.env_id.count(":") > 1 or not args.env_id:
+        fail(f"--env-id {args.env_id!r}; {allowed}")
     try:
         env = gym.make(args.env_id, disable_env_checker=True, **env_kwargs)
     except (gym.error.Error, ModuleNotFoundError) as error:
-        fail(f"--env-id {args.env_id}: {str(error).splitlines()[0]} Allowed: {', '.join(MODES)}, "
-             "or module:id of an environment of yours.")
+        fail(f"--env-id {args.env_id}: {str(error).splitlines()[0]}; {allowed}")
     space, actions = env.observation_space, env.action_space
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
         fail(f"--env-id {args.env_id}: observations must be a Box of one dimension, not {space}")
@@ -208,7 +229,8 @@ class Run:
 
     def _claim_folder(self) -> None:
         config_file = self.folder / "config.json"
-        if self.folder.is_dir() and any(self.folder.iterdir()):
+        # a file that a killed process left half-written does not make the folder another's
+        if self.folder.is_dir() and any(not path.name.endswith(".tmp") for path in self.folder.iterdir()):
             if not config_file.exists():
                 fail(f"--run-dir {self.folder}: neither empty nor a run's folder (it has no config.json)")
             if not self.args.overwrite:
@@ -259,6 +281,8 @@ class Run:
             draw_summary(file, title, evaluation, years, self.folder / "episodes.csv")
         with replacing(self.folder / "evaluation.csv") as file:
             evaluation.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+        for table in self.tables.values():
+            table.file.close()
         print_table(evaluation)
         print(f"{self.folder}: finished in {time.perf_counter() - self.start:.0f} s")
 

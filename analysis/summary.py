@@ -45,7 +45,7 @@ def draw_summary(file, title: str, evaluation: pd.DataFrame, years: pd.DataFrame
 def _draw_learning(axes, episodes: pd.DataFrame) -> None:
     for ax, (column, colour) in zip(axes, OBJECTIVE_COLOURS.items(), strict=True):
         ax.plot(episodes.global_step, episodes[column], ".", markersize=1, color=colour, alpha=0.25)
-        ax.plot(episodes.global_step, episodes[column].rolling(100, min_periods=1).mean(), color=colour,
+        ax.plot(episodes.global_step, episodes[column].rolling(100, min_periods=min(20, len(episodes))).mean(), color=colour,
                 label="mean of the last 100 episodes")
         ax.set(xlabel="environment steps", ylabel=column.replace("_", " "))
         ax.locator_params(axis="x", nbins=5)
@@ -68,7 +68,11 @@ def _draw_trade_off(figure, ax, evaluation: pd.DataFrame) -> None:
     for policy, marker in (("sampled", "o"), ("greedy", "^")):
         means = metrics.mean_returns(evaluation[evaluation.policy == policy])
         points = ax.scatter(means.thaw_return, means.carbon_return, c=means.index, vmin=0, vmax=1,
-                            marker=marker, edgecolors="black", linewidths=0.5, label=f"{policy} policy")
+                            marker=marker, edgecolors="black", linewidths=0.5)
+        ax.plot([], [], marker, color="white", markeredgecolor="black", label=f"{policy} policy")
+        for weight in (means.index[0], means.index[-1]):
+            ax.annotate(f"{weight:g}", means.loc[weight, ["thaw_return", "carbon_return"]], xytext=(5, 5),
+                        textcoords="offset points", fontsize=8)
     ax.set(xlabel="mean thaw return", ylabel="mean carbon return", title="evaluation, one point per weight")
     ax.locator_params(nbins=6)
     ax.ticklabel_format(useOffset=False)

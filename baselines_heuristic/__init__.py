@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-import tyro
 
 from analysis import protocol
 
@@ -42,7 +41,7 @@ def main(script: str, policy) -> None:
     A fixed strategy does not look at the preference and has no other policy when sampled. Its episodes are
     therefore the same under every weight, and are simulated once.
     """
-    args = tyro.cli(Args)
+    args = protocol.parse(Args)
     env_kwargs = protocol.prepare(args)
     if args.env_id not in protocol.MODES:
         protocol.fail(f"--env-id must be one of {', '.join(protocol.MODES)}, not {args.env_id}")

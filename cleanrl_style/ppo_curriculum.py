@@ -13,7 +13,6 @@ import numpy as np
 import torch
 import torch.nn as nn
 import torch.optim as optim
-import tyro
 from torch.distributions.categorical import Categorical
 
 import boreal_env
@@ -134,7 +133,7 @@ class Agent(nn.Module):
 
 
 def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda):
-    """Advantages (steps, envs); dones[t] says that step t is the first of an episode.
+    """Advantages (steps, envs); dones[t] says that step t follows the end of an episode.
 
     The end of an episode is terminal: nothing is worth anything beyond it, so nothing is bootstrapped.
     """
@@ -159,8 +158,8 @@ class Curriculum:
     NUM_SITE_INPUTS = 62
 
     def __init__(self, observation_dim, seed, threshold, raw):
-        self.threshold = threshold
         self.accepts_all = observation_dim != len(boreal_env.OBSERVATION_NAMES)
+        self.threshold = 0.0 if self.accepts_all else threshold
         # a generator of its own: the agent is the one that ppo_gated starts from
         generator = np.random.default_rng(seed)
         sizes = (self.NUM_SITE_INPUTS, 64, 64, 1)
@@ -205,7 +204,7 @@ class Curriculum:
 
 
 if __name__ == "__main__":
-    args = tyro.cli(Args)
+    args = protocol.parse(Args)
     env_kwargs = protocol.prepare(args)
     episode_columns = protocol.EPISODE_COLUMNS
     update_columns = ("iteration", "global_step", "policy_loss", "value_loss", "entropy", "old_approx_kl",
@@ -224,7 +223,8 @@ if __name__ == "__main__":
 
     # env setup
     if args.env_id in protocol.MODES:
-        boreal_env.warm_up()  # compile once, before the workers are forked
+        print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
+        boreal_env.warm_up(args.num_envs if args.vectorization == "lockstep" else 1)  # before workers are forked
     make_env = partial(gym.make, args.env_id, disable_env_checker=True, **env_kwargs)
     if args.vectorization == "async":
         envs = gym.vector.AsyncVectorEnv([make_env] * args.num_envs,
