@@ -54,7 +54,7 @@ def stress_ramp(value, zero, one) -> float:
 @compiled
 def canopy_balance(
     canopy, fixed, shortwave_absorbed, sky, cover, ground_emissivity,
-    ground, melt_span, ground_base, ground_by_emission, ground_by_canopy,
+    ground, melt_span, bare_gain, ground_base, ground_by_emission, ground_by_canopy,
     trunk_base, trunk_by_canopy, trunk_by_ground, trunk_conductance,
     air, air_conductance, dry_coefficient, wet_coefficient, wet_limit,
 ):  # fmt: skip
@@ -63,8 +63,10 @@ def canopy_balance(
     canopy : trial canopy temperature [degC]; fixed : energy used by photosynthesis, snow melt and sublimation
     [W m-2]; ground : temperature of the ground at the start of the step [degC], about which its emission is
     linear; melt_span : how much warmer [K] the ground would be if its snow, all of which it takes to melt, were not
-    there (0 without snow); ground_*, trunk_* : how the two answer to the canopy.
-    dry_coefficient, wet_coefficient : evaporation per net radiation; wet_limit : the intercepted rain, as a flux.
+    there (0 without snow); bare_gain : how much more the ground answers once it has melted (1 without snow);
+    ground_*, trunk_* : how the two answer to the canopy.
+    dry_coefficient, wet_coefficient : evaporation per net radiation that is not used otherwise; wet_limit : the
+    intercepted rain, as a flux.
     Returns (residual [W m-2], its slope [W m-2 K-1], net radiation, ground temperature [degC]).
     """
     kelvin = canopy + FREEZING_POINT_K
@@ -75,9 +77,9 @@ def canopy_balance(
 
     free_ground = ground_base + ground_by_emission * emission + ground_by_canopy * canopy
     # Below 0 degC, at 0 degC while snow melts, above it when the last snow has melted within the step.
-    new_ground = min(free_ground, 0.0) + max(free_ground - melt_span, 0.0)
-    melting = 0.0 < free_ground and free_ground < melt_span
-    answer = 0.0 if melting else ground_by_emission * emission_slope + ground_by_canopy
+    new_ground = min(free_ground, 0.0) + bare_gain * max(free_ground - melt_span, 0.0)
+    gain = 1.0 if free_ground <= 0.0 else (bare_gain if free_ground >= melt_span else 0.0)
+    answer = gain * (ground_by_emission * emission_slope + ground_by_canopy)
     trunk = trunk_base + trunk_by_canopy * canopy + trunk_by_ground * new_ground
 
     up = longwave_up(
@@ -89,10 +91,10 @@ def canopy_balance(
     net = shortwave_absorbed + cover * (sky + up - 2.0 * emission)
     net_slope = cover * (up_slope - 2.0 * emission_slope)
 
-    available = max(net, 0.0)
+    available = max(net - fixed, 0.0)
     wet = wet_coefficient * available
-    used = dry_coefficient if net > 0.0 else 0.0
-    used += wet_coefficient if net > 0.0 and wet < wet_limit else 0.0
+    used = dry_coefficient if net > fixed else 0.0
+    used += wet_coefficient if net > fixed and wet < wet_limit else 0.0
 
     latent = dry_coefficient * available + min(wet, wet_limit)
     residual = net - air_conductance * (canopy - air) - latent - fixed - trunk_conductance * (canopy - trunk)

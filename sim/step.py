@@ -99,7 +99,9 @@ def stores_before(b):
     s, p, w = b.s, b.p, b.w
     for i in range(len(s.swe)):
         w.saturation[i] = saturation_pressure(w.air[i])
-        w.deficit[i] = w.saturation[i] - w.vapour[i]
+        # The vapour of the day's mean is more than a cold night's air can hold: the rest is dew and fog, not followed.
+        w.humidity[i] = min(w.vapour[i], w.saturation[i])
+        w.deficit[i] = w.saturation[i] - w.humidity[i]
         w.snow[i] = w.precipitation_step[i] * snow_share(w.air[i])
         w.rain[i] = w.precipitation_step[i] - w.snow[i]
         ice = s.swe[i] + s.canopy_snow[i]
@@ -268,18 +270,19 @@ def conductances(b, seconds):
         emission = black_body(s.ground[i] + FREEZING_POINT_K)
         emission_slope = black_body_slope(s.ground[i] + FREEZING_POINT_K)
         snow = s.swe[i] > 0.0
-        over_ice = saturation_pressure(min(s.ground[i], 0.0))
-        ice_slope = saturation_slope(min(s.ground[i], 0.0), over_ice)
+        ice = min(s.ground[i], 0.0)  # snow that falls on a warm skin is at 0 degC
+        over_ice = saturation_pressure(ice)
+        ice_slope = saturation_slope(ice, over_ice)
         # No more snow than there is can sublimate within the step, even at 0 degC: the limit is on the conductance,
         # so that the ground's equation and what is moved agree.
-        drying = max(SATURATION_AT_FREEZING_HPA - w.vapour[i], 1e-3)
+        drying = max(SATURATION_AT_FREEZING_HPA - w.humidity[i], 1e-3)
         transfer = min(w.vapour_density[i] * velocity, s.swe[i] / (seconds * drying))
         stress = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds)
         sky_and_canopy = longwave_down(w.sky[i], black_body(w.air[i] + FREEZING_POINT_K), w.longwave_cover[i])
         available = w.ground_sw[i] + p.ground_emissivity[i] * (sky_and_canopy - emission)
         moist = p.priestley_taylor_ground[i] * equilibrium * stress if w.air[i] > 0.0 else 0.0
         w.ground_latent[i] = (
-            LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.vapour[i]) if snow else moist * max(available, 0.0)
+            LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.humidity[i]) if snow else moist * max(available, 0.0)
         )
         w.latent_slope[i] = LATENT_HEAT_SUBLIMATION * transfer * ice_slope if snow else 0.0
 
@@ -326,13 +329,18 @@ def conductances(b, seconds):
         ) = respond_to_canopy(
             s.trunk[i], s.trunk_capacity[i] / seconds, w.trunk_canopy[i], w.trunk_air[i], w.trunk_ground[i],
             s.ground[i], (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) / seconds, w.ground_conductance[i],
-            w.ground_sw[i] + p.ground_emissivity[i] * (1.0 - w.longwave_cover[i]) * w.sky[i] - w.ground_latent[i],
+            w.ground_sw[i] + p.ground_emissivity[i] * (1.0 - w.longwave_cover[i]) * w.sky[i]
+            - w.ground_latent[i] + w.latent_slope[i] * (ice - s.ground[i]),
             emission, emission_slope, w.latent_slope[i], p.ground_emissivity[i], w.longwave_cover[i], w.air[i],
             w.surface[i], surface_inertia, w.surface_conductance[i],
             w.deep[i], deep_inertia, w.deep_conductance[i], w.boundary_conductance[i],
             p.deep_boundary_temperature_k[i] - FREEZING_POINT_K,
         )  # fmt: skip
-        w.melt_span[i] = LATENT_HEAT_FUSION * s.swe[i] / (seconds * stiffness)
+        # At 0 degC some snow sublimates and the rest can melt; beyond, its heat capacity and its vapour are gone.
+        sublimating = (w.ground_latent[i] - w.latent_slope[i] * ice) * seconds / LATENT_HEAT_SUBLIMATION
+        meltable = s.swe[i] - sublimating if snow else 0.0
+        w.melt_span[i] = LATENT_HEAT_FUSION * max(meltable, 0.0) / (seconds * stiffness)
+        w.bare_gain[i] = stiffness / (stiffness - ICE_HEAT_CAPACITY * s.swe[i] / seconds - w.latent_slope[i])
         w.trial[i] = s.canopy[i]
         w.low[i] = w.air[i] - 100.0
         w.high[i] = w.air[i] + 100.0
@@ -345,14 +353,14 @@ def canopy_residual(b):
     for i in range(len(s.swe)):
         w.residual[i], w.slope[i], w.net[i], w.ground_new[i] = canopy_balance(
             w.trial[i], w.fixed[i], w.canopy_sw[i], w.sky[i], w.longwave_cover[i], p.ground_emissivity[i],
-            s.ground[i], w.melt_span[i], w.ground_base[i], w.ground_by_emission[i], w.ground_by_canopy[i],
+            s.ground[i], w.melt_span[i], w.bare_gain[i], w.ground_base[i], w.ground_by_emission[i], w.ground_by_canopy[i],
             w.trunk_base[i], w.trunk_by_canopy[i], w.trunk_by_ground[i], w.trunk_canopy[i],
             w.air[i], w.canopy_air[i], w.dry_coefficient[i], w.wet_coefficient[i], w.wet_limit[i],
         )  # fmt: skip
-    worst = 0.0
+    off = 0.0
     for i in range(len(s.swe)):
-        worst = max(worst, abs(w.residual[i]))
-    return worst > NEWTON_TOLERANCE
+        off += 0.0 if abs(w.residual[i]) <= NEWTON_TOLERANCE else 1.0
+    return off > 0.0
 
 
 @phase
@@ -390,7 +398,7 @@ def move_energy_and_water(b, seconds):
         to_sky = (1.0 - w.longwave_cover[i]) * up + w.longwave_cover[i] * emission
         net_stand = w.shortwave[i] - w.reflected[i] + w.sky[i] - to_sky
 
-        available = max(w.net[i], 0.0)
+        available = max(w.net[i] - w.fixed[i], 0.0)
         transpired = w.dry_coefficient[i] * available * seconds / LATENT_HEAT_VAPORISATION
         evaporated = min(w.wet_coefficient[i] * available, w.wet_limit[i]) * seconds / LATENT_HEAT_VAPORISATION
         canopy_heat = w.canopy_air[i] * (canopy - w.air[i])
@@ -403,7 +411,7 @@ def move_energy_and_water(b, seconds):
         deep_to_boundary = w.boundary_conductance[i] * (deep - boundary)
 
         snow = s.swe[i] > 0.0
-        latent = w.ground_latent[i] + w.latent_slope[i] * (ground - s.ground[i])
+        latent = w.ground_latent[i] + w.latent_slope[i] * (min(ground, 0.0) - min(s.ground[i], 0.0))
         sublimated = min(latent * seconds / LATENT_HEAT_SUBLIMATION, s.swe[i]) if snow else 0.0
         soil_evaporated = 0.0 if snow else latent * seconds / LATENT_HEAT_VAPORISATION
         latent = (LATENT_HEAT_SUBLIMATION * sublimated + LATENT_HEAT_VAPORISATION * soil_evaporated) / seconds

@@ -14,6 +14,7 @@ FREEZING_POINT_K = 273.15
 SATURATION_AT_FREEZING_HPA = 6.1121
 PSYCHROMETRIC_PER_HPA = 6.65e-4  # K-1; times the air pressure, gamma of Priestley and Taylor (1972)
 DAYS_PER_YEAR = 365
+LARGEST_RAIN_GROWTH = 1.0  # logarithm
 
 
 @compiled
@@ -97,9 +98,11 @@ def daily_precipitation(dice, amount, probability, mean, sensitivity, departure)
     """Precipitation of the day [mm]: `mean` x an exponential deviate `amount` on a wet day, scaled by temperature.
 
     departure : degrees of a rainy day from its season's base temperature (convection), of a snow day from the
-    climate's mean for the date.
+    climate's mean for the date. Beyond 2.7 times (15 degC at 0.07 per degree) rain grows no more: air that warm is
+    outside the records that the sensitivity is from.
     """
-    return mean * amount * exponential(sensitivity * departure) if dice < probability else 0.0
+    growth = exponential(min(sensitivity * departure, LARGEST_RAIN_GROWTH))
+    return mean * amount * growth if dice < probability else 0.0
 
 
 @compiled

@@ -1,0 +1,676 @@
+"""Process functions against values from the literature, limits, and cases worked out by hand."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba.core.dispatcher import Dispatcher
+from pytest import approx
+
+import sim.canopy
+import sim.carbon
+import sim.demography
+import sim.disturbance
+import sim.interception
+import sim.management
+import sim.mathematics
+import sim.radiation
+import sim.snow
+import sim.soil
+import sim.water
+import sim.weather
+from sim.demography import AGES, OLDEST
+from sim.jit import uncompiled
+
+
+def plain(module):
+    """The module's process functions as the interpreter runs them, which spares the tests their compilation."""
+    return SimpleNamespace(**{k: uncompiled(v) if isinstance(v, Dispatcher) else v for k, v in vars(module).items()})
+
+
+canopy, carbon, demography, disturbance = map(plain, (sim.canopy, sim.carbon, sim.demography, sim.disturbance))
+interception, management, mathematics = map(plain, (sim.interception, sim.management, sim.mathematics))
+radiation, snow, soil, water, weather = map(plain, (sim.radiation, sim.snow, sim.soil, sim.water, sim.weather))
+
+share = st.floats(0.0, 1.0)
+
+
+def day_of_year(day):
+    """Days are counted from 0."""
+    return day - 1
+
+
+# ------------------------------------------------------------------------------------------------ mathematics
+
+
+@given(st.floats(-690.0, 690.0))
+def test_exponential(x):
+    assert mathematics.exponential(x) == approx(math.exp(x), rel=1e-15)
+
+
+def test_exponential_beyond_its_range_is_its_limit():
+    assert mathematics.exponential(-1e4) == mathematics.exponential(-700.0) < 1e-300
+    assert mathematics.exponential(1e4) == mathematics.exponential(700.0) > 1e300
+
+
+# ---------------------------------------------------------------------------------------------------- weather
+
+
+@pytest.mark.parametrize(
+    ("celsius", "hpa"), [(0.0, 6.11), (10.0, 12.27), (20.0, 23.37), (30.0, 42.43), (-10.0, 2.599), (-20.0, 1.032)]
+)
+def test_saturation_pressure_of_the_smithsonian_tables(celsius, hpa):
+    assert weather.saturation_pressure(celsius) == approx(hpa, rel=3e-3)
+
+
+def test_saturation_is_lower_over_ice_than_over_supercooled_water():
+    assert weather.saturation_pressure_water(-10.0) == approx(2.863, rel=3e-3)
+    for celsius in (-40.0, -20.0, -5.0):
+        assert weather.saturation_pressure(celsius) < weather.saturation_pressure_water(celsius)
+
+
+@pytest.mark.parametrize("celsius", [-40.0, -3.0, 4.0, 25.0])
+def test_saturation_slope_is_the_derivative(celsius):
+    step = 1e-4
+    rise = weather.saturation_pressure(celsius + step) - weather.saturation_pressure(celsius - step)
+    slope = weather.saturation_slope(celsius, weather.saturation_pressure(celsius))
+    assert slope == approx(rise / (2.0 * step), rel=1e-6)
+
+
+def test_saturation_slope_of_fao_56():
+    assert weather.saturation_slope(20.0, weather.saturation_pressure(20.0)) == approx(1.447, rel=3e-3)
+
+
+def test_sky_emissivity_of_prata():
+    assert weather.sky_emissivity(15.0, 0.0, 0.0) == approx(1.0 - math.exp(-math.sqrt(1.2)))  # a dry sky: 0.666
+    assert weather.sky_emissivity(15.0, 10.0, 0.0) == approx(0.776, abs=1e-3)
+    assert weather.sky_emissivity(15.0, 10.0, 1.0) == 1.0
+    assert weather.sky_emissivity(15.0, 10.0, 0.5) == approx(0.888, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("clearness", "diffuse"), [(0.0, 1.0), (0.22, 0.980), (0.5, 0.659), (0.7, 0.244), (0.85, 0.165)]
+)
+def test_diffuse_share_of_erbs(clearness, diffuse):
+    assert weather.diffuse_share(clearness) == approx(diffuse, abs=2e-3)
+
+
+@pytest.mark.parametrize(("day", "degrees"), [(172, 23.45), (355, -23.45), (81, 0.0), (265, 0.0)])
+def test_declination_of_solstices_and_equinoxes(day, degrees):
+    assert math.degrees(weather.solar_declination(day_of_year(day))) == approx(degrees, abs=1.1)
+
+
+def test_the_sun_is_nearest_in_january():
+    assert weather.solar_distance_factor(day_of_year(3)) == approx(1.033, abs=1e-3)
+    assert weather.solar_distance_factor(day_of_year(184)) == approx(0.967, abs=1e-3)
+
+
+def test_seasons_begin_with_their_months():
+    starts = {1: 0, 60: 1, 152: 2, 244: 3, 335: 0}
+    for day, expected in starts.items():
+        assert weather.season(day_of_year(day)) == expected
+    assert [weather.season(day_of_year(day)) for day in (59, 151, 243, 334)] == [0, 1, 2, 3]
+    assert [weather.of_season(day, 10, 20, 30, 40) for day in (0, 100, 200, 300)] == [10, 20, 30, 40]
+
+
+def test_the_year_is_warmest_on_the_warmest_day():
+    warmest = 2.0 * math.pi * 194 / 365
+    for day, expected in ((194, 14.0), (194 + 182.5, -30.0), (194 + 91.25, -8.0)):
+        angle = 2.0 * math.pi * day / 365
+        sun = math.cos(angle), math.sin(angle), math.cos(warmest), math.sin(warmest)
+        assert weather.daily_mean_temperature(*sun, -8.0, 22.0, 0.0) == approx(expected)
+        assert weather.daily_mean_temperature(*sun, -8.0, 22.0, -3.0) == approx(expected - 3.0)
+
+
+@pytest.mark.parametrize(
+    ("day", "celsius", "kind"),
+    [(200, 15, 2), (150, -1, 2), (30, -20, 0), (30, 5, 0), (100, -1, 0), (100, 1, 1), (130, -1, 1), (280, -1, 0),
+     (280, 1, 1), (340, 1, 0)],
+)  # fmt: skip
+def test_precipitation_season(day, celsius, kind):
+    windows = (150, 250, 90, 150, 250, 300, 120, 270)
+    assert weather.precipitation_season(day, celsius, *windows) == kind
+
+
+def test_daily_precipitation():
+    assert weather.daily_precipitation(0.2, 1.0, 0.2, 10.0, 0.1, 0.0) == 0.0
+    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, 0.0) == approx(5.0)
+    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, -10.0) == approx(5.0 / math.e)
+
+
+def test_rain_damps_the_diurnal_range():
+    damping = (0.15, 1.0, 0.5, 1.2)
+    assert weather.diurnal_amplitude(6.0, 0.0, *damping, 1.0) == 6.0
+    assert weather.diurnal_amplitude(6.0, 3.0, *damping, 1.0) == approx(6.0 * 0.7)
+    assert weather.diurnal_amplitude(6.0, 50.0, *damping, 1.0) == approx(3.0)
+    assert weather.diurnal_amplitude(2.0, 50.0, *damping, 1.0) == approx(1.2)
+    assert weather.diurnal_amplitude(6.0, 0.0, *damping, 0.25) == approx(1.5)
+
+
+def test_snow_share():
+    assert [weather.snow_share(t) for t in (-5.0, 0.0, 1.0, 2.0, 9.0)] == [1.0, 1.0, 0.5, 0.0, 0.0]
+
+
+def test_drought_index():
+    assert weather.drought_index(10.0, 15.0, 0.0, 0.0, 0.2) == approx(13.0)
+    assert weather.drought_index(10.0, 15.0, 5.0, 0.0, 0.2) == approx(8.0)
+    assert weather.drought_index(10.0, 15.0, 50.0, 0.0, 0.2) == 0.0
+    assert weather.drought_index(10.0, -15.0, 0.0, 0.0, 0.2) == 10.0
+    assert weather.drought_index(10.0, 15.0, 0.0, 0.1, 0.2) == 0.0
+
+
+# -------------------------------------------------------------------------------------------------- radiation
+
+
+def test_path_through_the_canopy():
+    assert radiation.path_length(1.0, 0.65, 6.0) == 1.0
+    assert radiation.path_length(0.325, 0.65, 6.0) == approx(2.0)
+    assert radiation.path_length(0.01, 0.65, 6.0) == radiation.path_length(0.0, 0.65, 6.0) == 6.0
+
+
+def test_beer_lambert_limits():
+    assert radiation.canopy_interception(1.0, 0.0, 0.5, 2.0, 2.0) == (0.0, 0.0)
+    closed = radiation.canopy_interception(1.5, 1e3, 1.0, 0.6 * 4.0, 9.9)
+    assert closed == approx((1.0 - math.exp(-0.6 * 4.0 * 1.5), 0.0))
+    opaque = radiation.canopy_interception(2.0, 0.7, 0.25, 1e3, 1e3)
+    assert opaque == approx((0.25 * (1.0 - math.exp(-1.4)), 0.75 * (1.0 - math.exp(-1.4))))
+
+
+@given(st.floats(1.0, 20.0), st.floats(0.0, 20.0), share, st.floats(0.0, 20.0), st.floats(0.0, 20.0))
+def test_no_more_light_is_intercepted_than_comes(path, crowns, conifers, first, second):
+    one, other = radiation.canopy_interception(path, crowns, conifers, first, second)
+    assert one >= 0.0 and other >= 0.0 and one + other <= 1.0
+
+
+@given(st.floats(0.0, 1400.0), share, share, share, share, share, share, share, st.floats(0.0, 0.95))
+def test_shortwave_closes(incoming, diffuse, beam, beam_conifer, sky, sky_conifer, conifer, deciduous, ground):
+    intercepted = (beam * beam_conifer, beam * (1.0 - beam_conifer), sky * sky_conifer, sky * (1.0 - sky_conifer))
+    absorbed, below, reflected, *caught = radiation.shortwave(
+        incoming, diffuse, *intercepted, conifer, deciduous, ground
+    )
+    assert absorbed + below + reflected == approx(incoming, rel=1e-14, abs=1e-12)
+    assert min(absorbed, below, reflected, *caught) >= -1e-12 * incoming
+    assert sum(caught) == approx(incoming * ((1.0 - diffuse) * beam + diffuse * sky), rel=1e-12, abs=1e-12)
+
+
+def test_shortwave_limits():
+    bare = radiation.shortwave(100.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.8)
+    assert bare == approx((0.0, 20.0, 80.0, 0.0, 0.0))
+    closed = radiation.shortwave(100.0, 0.3, 1.0, 0.0, 1.0, 0.0, 0.1, 0.2, 0.8)
+    assert closed == approx((90.0, 0.0, 10.0, 100.0, 0.0))
+    # A canopy with gaps over snow, light going up and down: of 40 up, .5 leave by gaps, .45 are absorbed, .05 return.
+    half = radiation.shortwave(100.0, 1.0, 0.5, 0.0, 0.5, 0.0, 0.1, 0.2, 0.8)
+    series = sum(50.0 * (0.8 * 0.05) ** n for n in range(30))
+    assert half == approx((45.0 + 0.8 * 0.45 * series, 0.2 * series, 5.0 + 0.8 * 0.5 * series, 50.0, 0.0))
+
+
+def test_black_body():
+    assert radiation.black_body(273.15) == approx(315.66, abs=0.05)
+    step = 1e-3
+    rise = (radiation.black_body(280.0 + step) - radiation.black_body(280.0 - step)) / (2.0 * step)
+    assert radiation.black_body_slope(280.0) == approx(rise, rel=1e-8)
+
+
+@given(share, st.floats(0.9, 1.0))
+def test_longwave_of_an_isothermal_world_cancels(cover, emissivity):
+    emission = radiation.black_body(270.0)
+    down = radiation.longwave_down(emission, emission, cover)
+    assert down == approx(emission)
+    assert radiation.longwave_up(emission, down, emissivity) == approx(emission)
+
+
+def test_longwave_limits():
+    assert radiation.longwave_down(200.0, 300.0, 0.0) == 200.0
+    assert radiation.longwave_down(200.0, 300.0, 1.0) == 300.0
+    assert radiation.longwave_up(300.0, 200.0, 1.0) == 300.0
+    assert radiation.longwave_up(300.0, 200.0, 0.98) == approx(298.0)
+
+
+# ------------------------------------------------------------------------------------------------------- snow
+
+
+@pytest.mark.parametrize(("density", "expected"), [(100.0, 0.0464), (217.0, 0.0711), (300.0, 0.1260), (400.0, 0.2513)])
+def test_snow_conductivity_of_sturm(density, expected):
+    assert snow.conductivity(density) == approx(expected, abs=1e-4)
+
+
+def test_snow_density():
+    assert [snow.bulk_density(c, 217.0, 275.0) for c in (0.0, 0.5, 1.0)] == [275.0, 246.0, 217.0]
+
+
+ALBEDO = (0.85, 0.5, 1000.0, 100.0, 10.0, 1800.0)  # fresh, old, hours cold and melting, refreshing snowfall, step
+
+
+@given(st.floats(0.5, 0.85), st.floats(-40.0, 0.0), st.floats(0.0, 50.0))
+def test_snow_albedo_stays_between_old_and_fresh(albedo, celsius, snowfall):
+    assert 0.5 - 1e-12 <= snow.snow_albedo(albedo, celsius, snowfall, *ALBEDO) <= 0.85 + 1e-12
+
+
+def test_snow_albedo_ages_to_old_and_is_renewed_by_snowfall():
+    cold = melting = 0.85
+    for _ in range(2 * 100):  # 100 hours
+        cold = snow.snow_albedo(cold, -5.0, 0.0, *ALBEDO)
+        melting = snow.snow_albedo(melting, 0.0, 0.0, *ALBEDO)
+    assert melting == approx(0.5 + 0.35 * math.exp(-1.0), abs=1e-3)
+    assert cold == approx(0.5 + 0.35 * math.exp(-0.1), abs=1e-3)
+    assert snow.snow_albedo(0.5, -5.0, 10.0, *ALBEDO) == approx(0.675, abs=1e-3)
+    assert snow.snow_albedo(0.5, -5.0, 1e6, *ALBEDO) == approx(0.85, abs=1e-3)
+
+
+def test_snow_hides_the_ground():
+    assert snow.surface_albedo(0.0, 250.0, 0.1, 0.8, 0.2) == approx(0.2)
+    assert snow.surface_albedo(12.5, 250.0, 0.1, 0.8, 0.2) == approx(0.5)  # 12.5 mm of water in 5 cm of snow
+    assert (
+        snow.surface_albedo(25.0, 250.0, 0.1, 0.8, 0.2)
+        == snow.surface_albedo(90.0, 250.0, 0.1, 0.8, 0.2)
+        == approx(0.8)
+    )
+
+
+def test_stability():
+    assert snow.stability(-5.0, -5.0, 2.0, 2.0, 10.0, 3.0) == 1.0
+    richardson = 9.81 * 2.0 * 5.0 / (273.15 * 4.0)
+    assert snow.stability(-5.0, 0.0, 2.0, 2.0, 10.0, 3.0) == approx(1.0 / (1.0 + 10.0 * richardson))
+    assert snow.stability(5.0, 0.0, 2.0, 2.0, 10.0, 3.0) == approx(math.sqrt(1.0 + 10.0 * richardson))
+    assert snow.stability(40.0, 0.0, 0.3, 2.0, 10.0, 3.0) == 3.0
+
+
+# ------------------------------------------------------------------------------------------------------- soil
+
+NODE = (1.15e6, 0.85e6, 4.342e7, 1.0)  # 0.5 m of soil: capacities thawed and frozen, latent heat, freezing range
+
+
+@given(st.floats(-60.0, 40.0))
+def test_temperature_inverts_enthalpy(celsius):
+    assert soil.temperature(soil.enthalpy(celsius, *NODE), *NODE) == approx(celsius, rel=1e-12, abs=1e-12)
+
+
+@given(st.floats(-2e8, 1e8))
+def test_enthalpy_inverts_temperature(heat):
+    assert soil.enthalpy(soil.temperature(heat, *NODE), *NODE) == approx(heat, rel=1e-12, abs=1e-5)
+
+
+def test_freezing_takes_the_latent_heat():
+    assert soil.enthalpy(0.0, *NODE) == 0.0
+    assert soil.enthalpy(1.0, *NODE) == approx(1.15e6)
+    assert soil.enthalpy(-1.0, *NODE) == approx(-(4.342e7 + 0.85e6))
+    assert soil.enthalpy(-3.0, *NODE) - soil.enthalpy(-2.0, *NODE) == approx(-0.85e6)
+    assert soil.temperature(-0.5 * (4.342e7 + 0.85e6), *NODE) == approx(-0.5)
+
+
+@pytest.mark.parametrize("celsius", [-7.0, -0.4, 3.0])
+def test_soil_heat_capacity_is_the_slope_of_enthalpy(celsius):
+    step = 1e-4
+    rise = soil.enthalpy(celsius + step, *NODE) - soil.enthalpy(celsius - step, *NODE)
+    assert soil.heat_capacity(celsius, *NODE) == approx(rise / (2.0 * step), rel=1e-6)
+
+
+def test_frozen_share_and_conductivity():
+    assert [soil.frozen_share(t, 2.0) for t in (3.0, 0.0, -0.5, -2.0, -9.0)] == [0.0, 0.0, 0.25, 1.0, 1.0]
+    assert soil.conductivity(0.0, 1.0, 1.4) == 1.0
+    assert soil.conductivity(0.5, 1.0, 1.4) == approx(1.2)
+
+
+def test_organic_layer_grows_slowly_and_decays_when_its_canopy_is_gone():
+    depths = (0.165, 0.075, 0.08, 0.002, 15.0)
+    assert soil.organic_layer(0.165, 1.0, 0.0, *depths) == approx(0.165)
+    assert soil.organic_layer(0.05, 1.0, 0.0, *depths) == approx(0.052)
+    assert soil.organic_layer(0.1645, 1.0, 0.0, *depths) == approx(0.165)
+    assert soil.organic_layer(0.165, 0.0, 0.0, *depths) == approx(0.165 - 0.085 / 15.0)
+    assert soil.organic_layer(0.12, 0.5, 0.5, *depths) == approx(0.12)
+
+
+def test_thaw_depth_of_stefan():
+    latent = 3.34e5 * 1000.0 * 0.26
+    assert soil.thaw_depth(0.1, -1.0, 0.5, 0.0, latent, 4.5, 1.0) == approx(0.1)
+    assert soil.thaw_depth(0.1, -0.5, 0.5, 9e9, latent, 4.5, 1.0) == approx(0.35)
+    assert soil.thaw_depth(0.1, 5.0, 0.5, 0.3 * latent, latent, 4.5, 1.0) == approx(0.9)
+    assert soil.thaw_depth(0.1, 5.0, 0.5, 9e9, latent, 4.5, 1.0) == approx(5.1)
+
+
+def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
+    """The elimination from the bottom up against a general solver of the same four equations."""
+    generator = np.random.default_rng(0)
+    for _ in range(20):
+        (trunk, ground, surface, deep, air, boundary, canopy_now) = generator.uniform(-20.0, 20.0, 7)
+        (trunk_inertia, ground_inertia, surface_inertia, deep_inertia) = generator.uniform(1.0, 900.0, 4)
+        (canopy_trunk, trunk_air, trunk_ground, ground_air, vapour, ground_surface, surface_deep, below) = (
+            generator.uniform(0.0, 30.0, 8)
+        )
+        source, emission, slope, emissivity, cover = *generator.uniform(0.0, 400.0, 2), 4.6, 0.97, generator.random()
+        canopy_emission = generator.uniform(200.0, 400.0)
+        (deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base, trunk_by_canopy, trunk_by_ground,
+         ground_base, ground_by_emission, ground_by_canopy, stiffness) = soil.respond_to_canopy(
+            trunk, trunk_inertia, canopy_trunk, trunk_air, trunk_ground,
+            ground, ground_inertia, ground_air, source, emission, slope, vapour, emissivity, cover, air,
+            surface, surface_inertia, ground_surface, deep, deep_inertia, surface_deep, below, boundary,
+        )  # fmt: skip
+        new_ground = ground_base + ground_by_emission * canopy_emission + ground_by_canopy * canopy_now
+        new_surface = surface_base + surface_by_ground * new_ground
+        new = [
+            trunk_base + trunk_by_canopy * canopy_now + trunk_by_ground * new_ground,
+            new_ground,
+            new_surface,
+            deep_base + deep_by_surface * new_surface,
+        ]
+        # Inertia x change = heat in - heat out, for trunk, ground, surface and deep soil.
+        matrix = np.array([
+            [trunk_inertia + canopy_trunk + trunk_air + trunk_ground, -trunk_ground, 0.0, 0.0],
+            [-trunk_ground, ground_inertia + emissivity * slope + ground_air + vapour + trunk_ground + ground_surface,
+             -ground_surface, 0.0],
+            [0.0, -ground_surface, surface_inertia + ground_surface + surface_deep, -surface_deep],
+            [0.0, 0.0, -surface_deep, deep_inertia + surface_deep + below],
+        ])  # fmt: skip
+        right = [
+            trunk_inertia * trunk + canopy_trunk * canopy_now + trunk_air * air,
+            ground_inertia * ground + source + emissivity * (cover * canopy_emission - emission + slope * ground)
+            + ground_air * air + vapour * ground,
+            surface_inertia * surface,
+            deep_inertia * deep + below * boundary,
+        ]  # fmt: skip
+        np.testing.assert_allclose(new, np.linalg.solve(matrix, right), rtol=1e-9, atol=1e-9)
+        assert 1.0 / stiffness == approx(np.linalg.inv(matrix)[1, 1])  # warming of the ground per W m-2 into it
+
+
+# ----------------------------------------------------------------------------------------------------- canopy
+
+
+def test_crowns_grow_along_straight_lines():
+    factors = (0.1, 0.5, 0.9, 1.0, 0.8)
+    known = {0: 0.0, 3: 0.1, 8: 0.3, 13: 0.5, 30: 0.9, 50: 0.95, 70: 1.0, 101: 0.8}
+    for age, expected in known.items():
+        assert canopy.crown_factor(age, *factors) == approx(expected)
+
+
+def test_leaves_come_and_go():
+    leaf = [canopy.leaf_out(day_of_year(day), 140.0, 0.12, 270.0, 0.12) for day in range(1, 366)]
+    assert leaf[139] == approx(0.5, abs=1e-6) and leaf[269] == approx(0.5, abs=1e-6)
+    assert leaf[204] > 0.99 and max(leaf[:60]) < 1e-3 and max(leaf[340:]) < 1e-3
+    assert leaf[139 + 10] == approx(1.0 / (1.0 + math.exp(-1.2)), abs=1e-5)
+
+
+def test_aerodynamic_conductance():
+    log = math.log(10.0 / 1.5 + 1.0)
+    assert canopy.aerodynamic_conductance(3.0, 1.5, 10.0, 2.0) == approx(0.4**2 * 3.0 / (log * (log + 2.0)))
+    assert canopy.aerodynamic_conductance(0.0, 1.5, 10.0, 2.0) == 0.0
+
+
+def test_stress_ramp():
+    assert [canopy.stress_ramp(v, -8.0, 8.0) for v in (-20.0, -8.0, 0.0, 8.0, 20.0)] == [0.0, 0.0, 0.5, 1.0, 1.0]
+
+
+@pytest.mark.parametrize("melt_span", [0.0, 2.0, 1e3], ids=["no snow", "melts out", "deep snow"])
+@pytest.mark.parametrize("trial", [-15.0, 2.0, 18.0])
+def test_slope_of_the_canopy_balance_is_its_derivative(trial, melt_span):
+    def balance(t):
+        return canopy.canopy_balance(
+            t, 12.0, 250.0, 280.0, 0.7, 0.98, 1.0, melt_span, 1.3, 1.5, 0.01, 0.05, 0.4, 0.3, 0.2, 1.4,
+            6.0, 25.0, 0.4, 0.1, 8.0,
+        )  # fmt: skip
+
+    step = 1e-4
+    residual, slope, net, _ = balance(trial)
+    assert slope == approx((balance(trial + step)[0] - balance(trial - step)[0]) / (2.0 * step), rel=1e-6)
+    assert slope < 0.0 < net
+
+
+def test_melting_snow_holds_the_ground_at_zero_until_it_is_gone():
+    def ground(base, melt_span, bare_gain):
+        return canopy.canopy_balance(
+            2.0, 0.0, 250.0, 280.0, 0.7, 0.98, 0.0, melt_span, bare_gain, base, 0.0, 0.0, 0.4, 0.3, 0.2, 1.4,
+            6.0, 25.0, 0.4, 0.1, 8.0,
+        )[3]  # fmt: skip
+
+    assert [ground(base, 3.0, 1.5) for base in (-4.0, 0.0, 2.0, 3.0, 5.0)] == [-4.0, 0.0, 0.0, 0.0, 3.0]
+    assert [ground(base, 0.0, 1.0) for base in (-4.0, 0.0, 5.0)] == [-4.0, 0.0, 5.0]
+
+
+def test_newton_takes_the_middle_where_its_step_leaves_the_bracket():
+    assert canopy.newton_step(1.0, 4.0, -2.0, -100.0, 100.0) == (3.0, 1.0, 100.0)
+    assert canopy.newton_step(1.0, -4.0, -2.0, -100.0, 100.0) == (-1.0, -100.0, 1.0)
+    assert canopy.newton_step(1.0, 4.0, -0.001, -100.0, 100.0) == (50.5, 1.0, 100.0)
+
+
+# ----------------------------------------------------------------------------------------------------- carbon
+
+
+def test_photosynthesis_of_mod17():
+    # 100 W m-2 for a day are 8.64 MJ, of which 45 % are PAR: 3.888 MJ x 1.2 gC MJ-1 = 4.67 gC.
+    a_day = 86400.0 * carbon.photosynthesis(100.0, 1.0, 1.2, 0.45, 1.0, 1.0, 1.0)
+    assert a_day == approx(4.6656e-3)
+    assert 86400.0 * carbon.photosynthesis(100.0, 0.5, 1.2, 0.45, 0.5, 0.5, 0.5) == approx(a_day / 16.0)
+
+
+def test_q10():
+    assert carbon.q10_factor(10.0, 10.0, math.log(2.0)) == approx(1.0)
+    assert carbon.q10_factor(20.0, 10.0, math.log(2.0)) == approx(2.0)
+    assert carbon.q10_factor(-10.0, 10.0, math.log(2.0)) == approx(0.25)
+
+
+def test_maintenance_of_the_reference_stand_is_its_base_rate():
+    assert 365.0 * 86400.0 * carbon.maintenance(0.35, 4.0, 5.0, 0.9, 4.0, 5.0) == approx(0.35)
+    assert 365.0 * 86400.0 * carbon.maintenance(0.35, 0.0, 5.0, 0.9, 4.0, 5.0) == approx(0.035)
+
+
+def test_autotrophic_respiration_costs_growth_and_never_more_than_there_is():
+    assert carbon.autotrophic(10.0, 4.0, 0.2, 100.0, 1.0) == approx(4.0 + 0.2 * 6.0)
+    assert carbon.autotrophic(0.0, 4.0, 0.2, 100.0, 1.0) == approx(4.0)
+    assert carbon.autotrophic(1.0, 4.0, 0.2, 0.5, 1.0) == approx(1.5)
+
+
+@pytest.mark.parametrize("fall", [210.0, 270.0, 310.0, 360.0])
+def test_litter_of_all_days_is_the_years(fall):
+    shares = [carbon.litter_share(day, fall, 45.0, 0.75) for day in range(365)]
+    assert sum(shares) == approx(1.0)
+    assert sum(s for s in shares if s > 1.0 / 365.0) == approx(0.75)
+
+
+# ----------------------------------------------------------------------------------------------- interception
+
+
+def test_snow_capacity():
+    assert interception.snow_capacity(0.0, 4.0, 4.4, 6.0) == approx(17.6)
+    assert interception.snow_capacity(-5.5, 4.0, 4.4, 6.0) == approx(20.8)
+    assert interception.snow_capacity(-30.0, 4.0, 4.4, 6.0) == approx(24.0)
+
+
+@given(st.floats(0.0, 50.0), st.floats(0.0, 30.0), st.floats(0.0, 30.0), share)
+def test_no_more_is_intercepted_than_falls_and_fits(fall, store, capacity, efficiency):
+    held = interception.intercepted(fall, store, capacity, efficiency)
+    assert 0.0 <= held <= fall
+    assert held <= max(capacity - store, 0.0) + 1e-12
+
+
+def test_interception_shrinks_as_the_canopy_fills():
+    assert interception.intercepted(1.0, 0.0, 10.0, 0.6) == approx(0.6)
+    assert interception.intercepted(1.0, 5.0, 10.0, 0.6) == approx(0.3)
+    assert interception.intercepted(1.0, 10.0, 10.0, 0.6) == interception.intercepted(1.0, 0.0, 0.0, 0.6) == 0.0
+
+
+def test_sublimation_of_intercepted_snow():
+    penman = (3.0 * 50.0 + 20.0 * 1.0) / (3.0 + 0.65)
+    mm = interception.snow_sublimation(5.0, 10.0, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0)
+    assert mm == approx(0.6 * 0.5 * penman / 2.834e6 * 1800.0)
+    assert interception.snow_sublimation(1e-5, 1e-5, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0) == 1e-5
+    assert interception.snow_sublimation(5.0, 10.0, 0.6, -50.0, 20.0, -1.0, 3.0, 0.65, 2.834e6, 1800.0) == 0.0
+    assert interception.snow_sublimation(0.0, 0.0, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0) == 0.0
+
+
+def test_melt_and_unloading_of_intercepted_snow():
+    assert interception.snow_melt(5.0, 10.0, -2.0, 20.0, 3.34e5, 1800.0) == 0.0
+    assert interception.snow_melt(5.0, 10.0, 2.0, 20.0, 3.34e5, 1800.0) == approx(0.5 * 40.0 / 3.34e5 * 1800.0)
+    assert interception.snow_melt(1e-6, 10.0, 9.0, 20.0, 3.34e5, 1800.0) == 1e-6
+    assert interception.unloaded(2.4, 10.0, 0.0, 240.0, 0.4, 3600.0) == approx(0.01)
+    assert interception.unloaded(2.4, 10.0, 1.0, 240.0, 0.4, 3600.0) == approx(0.41)
+    assert interception.unloaded(12.0, 10.0, 0.0, 240.0, 0.4, 3600.0) == approx(2.0)
+    assert interception.unloaded(1.0, 10.0, 9.0, 240.0, 0.4, 3600.0) == 1.0
+
+
+def test_soil_bucket():
+    ramp = 50.0 + water.LARGEST_EVAPORATION * 1800.0
+    stresses = [water.water_stress(share * ramp, 100.0, 0.5, 1800.0) for share in (0.0, 0.5, 1.0, 1.5)]
+    assert stresses == approx([0.0, 0.5, 1.0, 1.0])
+    assert water.runoff(90.0, 100.0) == 0.0 and water.runoff(130.0, 100.0) == 30.0
+
+
+@given(st.floats(0.0, 500.0), st.floats(20.0, 500.0), st.floats(0.05, 1.0), st.sampled_from([600.0, 1800.0, 7200.0]))
+def test_no_step_evaporates_more_than_there_is(held, capacity, threshold, seconds):
+    largest = water.LARGEST_EVAPORATION * seconds
+    assert water.water_stress(held, capacity, threshold, seconds) * largest <= held
+
+
+# ------------------------------------------------------------------------------------------------- demography
+
+
+def stems(**by_age):
+    """One lane of stems, from keywords such as age30=100."""
+    array = np.zeros((AGES, 1))
+    for name, number in by_age.items():
+        array[int(name.removeprefix("age")), 0] = number
+    return array
+
+
+def test_stems_grow_older_and_the_oldest_are_pooled():
+    trees = stems(age0=5.0, age5=10.0, age20=20.0, age100=7.0, age101=3.0)
+    demography.grow_older(trees, 0)
+    np.testing.assert_array_equal(trees, stems(age1=5.0, age6=10.0, age21=20.0, age101=10.0))
+
+
+def test_a_planted_tree_is_young_after_21_years_and_old_after_101():
+    trees = stems(age0=100.0)
+    for years in range(1, 111):
+        demography.grow_older(trees, 0)
+        assert demography.count(trees, 0, 21, OLDEST) == (100.0 if years >= 21 else 0.0)
+        assert demography.count(trees, 0, 101, OLDEST) == (100.0 if years >= 101 else 0.0)
+
+
+def test_count_includes_both_ends():
+    assert demography.count(stems(age5=1.0, age6=2.0, age20=4.0, age21=8.0), 0, 6, 20) == 6.0
+
+
+def test_trees_grow_toward_their_full_height():
+    heights = [demography.relative_height(age, 0.0215, 1.2243) for age in range(0, 400, 10)]
+    assert heights[0] == 0.0 and np.all(np.diff(heights) > 0.0) and 0.99 < heights[-1] < 1.0
+    assert demography.relative_height(50.0, 0.02, 1.0) == approx(1.0 - math.exp(-1.0))
+    assert demography.stem_weight(50, 0.02, 1.0, 2.0) == approx((1.0 - math.exp(-1.0)) ** 2)
+
+
+def test_self_thinning_and_recruitment():
+    assert demography.self_thinning(1000.0, 2000.0, 0.8, 0.035) == 0.0
+    assert demography.self_thinning(1800.0, 2000.0, 0.8, 0.035) == approx(0.0175)
+    assert demography.self_thinning(2000.0, 2000.0, 0.8, 0.035) == approx(0.035)
+    assert demography.recruits(0.0, 2000.0, 0.01) == approx(20.0)
+    assert demography.recruits(500.0, 2000.0, 0.01) == approx(15.0)
+    assert demography.recruits(2500.0, 2000.0, 0.01) == 0.0
+
+
+def test_hazards():
+    assert disturbance.fire_hazard(0.0003, 0.5, 0.25, 1.0, 0.2) == approx(0.0003 * 0.55)
+    assert disturbance.fire_weather(31.0, 13.0, 30.0, 12.0)
+    assert not disturbance.fire_weather(30.0, 13.0, 30.0, 12.0)
+    assert not disturbance.fire_weather(31.0, 12.0, 30.0, 12.0)
+    assert [disturbance.between(2.0, 4.0, u) for u in (0.0, 0.5, 1.0)] == [2.0, 3.0, 4.0]
+    assert disturbance.outbreak_probability(0.04, -50.0, 1000.0, -40.0, -20.0, 1000.0) == 0.0
+    assert disturbance.outbreak_probability(0.04, -30.0, 500.0, -40.0, -20.0, 1000.0) == approx(0.01)
+    assert disturbance.outbreak_probability(0.04, 0.0, 9000.0, -40.0, -20.0, 1000.0) == approx(0.04)
+
+
+# ------------------------------------------------------------------------------------------------- management
+
+
+@pytest.mark.parametrize(
+    ("change", "density", "harvestable", "made"),
+    [
+        (100.0, 500.0, 0.0, 100.0),
+        (100.0, 1950.0, 0.0, 50.0),  # planting reaches 2000
+        (100.0, 2500.0, 0.0, 0.0),
+        (-100.0, 500.0, 400.0, -100.0),
+        (-100.0, 500.0, 30.0, -30.0),  # no more than may be cut
+        (-100.0, 190.0, 190.0, -40.0),  # never below 150
+        (-100.0, 120.0, 120.0, 0.0),
+        (0.0, 500.0, 400.0, 0.0),
+    ],
+)
+def test_what_can_be_made_of_a_density_change(change, density, harvestable, made):
+    assert management.feasible_change(change, density, harvestable) == made
+
+
+@pytest.mark.parametrize(
+    ("cut", "mix", "conifers", "deciduous", "harvestable", "expected"),
+    [
+        (100.0, 0.5, 300.0, 300.0, (300.0, 300.0), 50.0),  # stays at one half: equal shares
+        (100.0, 0.5, 400.0, 200.0, (400.0, 200.0), 100.0),  # 400 of 600 toward one half: conifers only
+        (100.0, 0.5, 320.0, 280.0, (320.0, 280.0), 70.0),  # 250 and 250 remain
+        (100.0, 1.0, 300.0, 300.0, (300.0, 300.0), 0.0),
+        (100.0, 0.0, 300.0, 300.0, (300.0, 300.0), 100.0),
+        (100.0, 0.0, 60.0, 540.0, (60.0, 540.0), 60.0),  # no more conifers than there are
+        (100.0, 0.0, 300.0, 300.0, (40.0, 300.0), 40.0),  # than may be cut
+        (100.0, 1.0, 300.0, 300.0, (300.0, 20.0), 80.0),  # the other species cannot give the rest
+    ],
+)
+def test_which_species_is_thinned(cut, mix, conifers, deciduous, harvestable, expected):
+    assert management.conifers_to_cut(cut, mix, conifers, deciduous, *harvestable) == approx(expected)
+
+
+@given(share, st.floats(0.0, 1500.0), st.floats(0.0, 1500.0), share, share, st.floats(0.0, 100.0))
+def test_thinning_comes_as_near_to_the_mix_as_it_can(mix, conifers, deciduous, reach, other_reach, cut):
+    harvestable = (reach * conifers, other_reach * deciduous)
+    cut = min(cut, sum(harvestable))
+    chosen = management.conifers_to_cut(cut, mix, conifers, deciduous, *harvestable)
+    assert -1e-9 <= chosen <= harvestable[0] + 1e-9 and cut - chosen <= harvestable[1] + 1e-9
+    remaining = conifers + deciduous - cut
+    if remaining > 1.0:
+
+        def distance(cut_conifers):
+            return abs((conifers - cut_conifers) / remaining - mix)
+
+        options = np.linspace(max(cut - harvestable[1], 0.0), min(cut, harvestable[0]), 21)
+        assert distance(chosen) <= min(distance(option) for option in options) + 1e-9
+
+
+FORM = (40, 100, 0.0215, 1.2243, 2.5)  # last ages of young and mature, height rate and shape, carbon exponent
+
+
+def test_the_oldest_class_is_cut_first():
+    trees = stems(age10=100.0, age30=50.0, age70=40.0, age101=30.0)
+    management.cut_oldest(trees, 0, 50.0, 21, *FORM)
+    np.testing.assert_allclose(trees, stems(age10=100.0, age30=50.0, age70=20.0, age101=0.0), atol=1e-9)
+    management.cut_oldest(trees, 0, 50.0, 21, *FORM)
+    np.testing.assert_allclose(trees, stems(age10=100.0, age30=20.0), atol=1e-9)
+
+
+def test_within_a_class_all_ages_are_cut_alike():
+    trees = stems(age41=10.0, age60=20.0, age100=30.0)
+    management.cut_oldest(trees, 0, 30.0, 21, *FORM)
+    np.testing.assert_allclose(trees, stems(age41=5.0, age60=10.0, age100=15.0))
+
+
+@pytest.mark.parametrize(
+    ("first_age", "left"), [(21, {}), (41, {"age30": 50.0}), (101, {"age30": 50.0, "age70": 40.0})]
+)
+def test_classes_below_the_youngest_allowed_are_never_cut(first_age, left):
+    trees = stems(age20=100.0, age30=50.0, age70=40.0, age101=30.0)
+    available = demography.count(trees, 0, first_age, OLDEST)
+    management.cut_oldest(trees, 0, available, first_age, *FORM)
+    np.testing.assert_allclose(trees, stems(age20=100.0, **left), atol=1e-9)
+
+
+def test_old_trees_carry_more_carbon_than_young_ones():
+    trees = stems(age10=100.0, age101=100.0)
+    cut = management.cut_oldest(trees, 0, 100.0, 21, *FORM)
+    young, old = (demography.stem_weight(age, *FORM[2:]) for age in (10, 101))
+    assert cut == approx(old / (old + young))
+    assert cut > 0.95
+
+
+def test_no_trees_no_carbon():
+    assert management.cut_oldest(stems(), 0, 0.0, 21, *FORM) == 0.0
+
+
+def test_decoding_of_actions():
+    change, mix = management.decode(np.arange(25))
+    assert change.tolist() == [c for c in (-100.0, -50.0, 0.0, 50.0, 100.0) for _ in range(5)]
+    assert mix.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0] * 5

@@ -1,0 +1,461 @@
+"""The scientist's door: the table, observed weather, overrides that change nothing else, refusals, magnitudes."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import sim
+from sim.demography import AGES
+from sim.parameters import CONSTANTS, SITE_PARAMETERS, mean_annual_temperature
+from sim.simulate import check_forcing
+from sim.state import DAILY, FORCING
+
+QUICK = {"seed": 1, "years": 1, "time_step_minutes": 240}
+SPECIES_AND_CLASSES = [
+    f"{species}_{age}_stems_ha"
+    for species in ("conifer", "deciduous")
+    for age in ("seedling", "sapling", "young", "mature", "old")
+]
+CONTRACT = """
+year density_stems_ha conifer_fraction biomass_kgc_m2 soil_kgc_m2 hwp_kgc_m2 gpp_kgc_m2
+autotrophic_respiration_kgc_m2 heterotrophic_respiration_kgc_m2 litterfall_kgc_m2 mortality_kgc_m2 fire_loss_kgc_m2
+harvest_kgc_m2 net_carbon_change_kgc_m2 precipitation_mm evapotranspiration_mm runoff_mm sublimation_mm peak_swe_mm
+snow_off_doy snow_days latent_heat_mj_m2 ground_shortwave_mj_m2 air_temperature_c surface_soil_temperature_c
+deep_soil_temperature_c active_layer_depth_m boundary_warming_mj_m2 boundary_cooling_mj_m2 growing_season_days max_lai
+summer_albedo winter_albedo drought_index organic_layer_m fire_mortality insect_mortality energy_residual_w_m2
+water_residual_mm carbon_residual_kgc_m2 stems_residual_ha
+""".split()
+
+
+def simulate(site=None, actions=12, **changes):
+    return sim.simulate(site, actions, **{**QUICK, **changes})
+
+
+def observed(days=365, minutes=240, start="2019-01-01", **columns):
+    """A plain cosine year in the columns of an observed forcing."""
+    index = pd.date_range(start, periods=int(days * 1440 // minutes), freq=f"{minutes}min")
+    day, hour = index.day_of_year.to_numpy(), index.hour.to_numpy()
+    summer = np.cos(2.0 * np.pi * (day - 194) / 365.0)
+    values = {
+        "air_temperature_c": -3.0 + 17.0 * summer,
+        "relative_humidity": 0.7,
+        "wind_speed_m_s": 3.0,
+        "shortwave_w_m2": np.maximum(np.sin(np.pi * (hour - 4.0) / 16.0), 0.0) * (180.0 + 160.0 * summer),
+        "longwave_w_m2": 260.0 + 60.0 * summer,
+        "precipitation_mm": 0.25,
+    }
+    return pd.DataFrame({**values, **columns}, index=index)
+
+
+# --------------------------------------------------------------------------------------------------- the table
+
+
+def test_annual_record_has_the_contracts_columns():
+    table = simulate(years=3)
+    assert set(CONTRACT + SPECIES_AND_CLASSES) <= set(table.columns)
+    assert table.year.tolist() == [0, 1, 2]
+    assert not table.drop(columns=["summer_albedo", "winter_albedo"]).isna().any().any()
+
+
+def test_daily_output_has_a_row_a_day():
+    table = simulate(years=2, output="daily")
+    assert tuple(table.columns) == ("year", "doy", *DAILY)
+    assert table.groupby("year").doy.apply(list).tolist() == [list(range(1, 366))] * 2
+
+
+def test_annual_and_daily_output_are_of_the_same_run():
+    annual, daily = simulate(years=2), simulate(years=2, output="daily")
+    by_year = daily.groupby("year")
+    np.testing.assert_allclose(by_year.gpp_kgc_m2.sum(), annual.gpp_kgc_m2, rtol=1e-9)
+    np.testing.assert_allclose(by_year.swe_mm.max(), annual.peak_swe_mm, rtol=1e-12)
+    np.testing.assert_allclose(by_year.air_temperature_c.mean(), annual.air_temperature_c, rtol=1e-9)
+    assert ((by_year.air_temperature_c.agg(lambda t: (t > 5.0).sum())) == annual.growing_season_days).all()
+
+
+def test_one_action_for_all_years_or_one_for_each():
+    pd.testing.assert_frame_equal(simulate(actions=24, years=3), simulate(actions=[24, 24, 24], years=3))
+    planted = simulate(actions=[24, 12, 17], years=3).planted_stems_ha
+    assert planted.tolist() == [100.0, 0.0, 50.0]
+
+
+def test_planting_adds_the_mix_and_thinning_the_rest():
+    table = simulate(actions=[20, 24], years=2, initial={"density_stems_ha": 400.0, "conifer_fraction": 0.5})
+    assert table.density_after_action[0] == pytest.approx(500.0)
+    assert table.conifer_fraction_after_action[0] == pytest.approx(0.4)
+    thinned = simulate(
+        actions=4, initial={"density_stems_ha": 900.0, "conifer_fraction": 0.5, "oldest_age_years": 120.0}
+    )
+    assert thinned.density_after_action[0] == pytest.approx(800.0)
+    assert thinned.conifer_fraction_after_action[0] == pytest.approx(450.0 / 800.0)
+    assert thinned.harvest_kgc_m2[0] > 0.0 and thinned.hwp_kgc_m2[0] == pytest.approx(0.75 * thinned.harvest_kgc_m2[0])
+
+
+@pytest.mark.parametrize(
+    ("youngest", "cut"), [("young", 100.0), ("mature", 100.0), ("old", pytest.approx(62.0, abs=1.0))]
+)
+def test_the_youngest_class_that_may_be_cut(youngest, cut):
+    initial = {"density_stems_ha": 900.0, "conifer_fraction": 0.5, "oldest_age_years": 110.0}
+    table = simulate(actions=2, initial=initial, harvest_min_class=youngest)
+    first = {"young": 21, "mature": 41, "old": 101}[youngest]
+    survival = 0.975 ** np.arange(110)
+    harvestable = 900.0 * survival[first - 1 :].sum() / survival.sum()
+    assert table.harvestable_stems_ha[0] == pytest.approx(harvestable)
+    assert table.thinned_stems_ha[0] == pytest.approx(min(100.0, harvestable))
+
+
+def test_products_decay_with_their_half_life():
+    initial = {"hwp_kgc_m2": 8.0}
+    assert simulate(initial=initial, years=2).hwp_kgc_m2.tolist() == [8.0, 8.0]
+    assert simulate(initial=initial, years=20, hwp_half_life_years=10.0).hwp_kgc_m2.iloc[-1] == pytest.approx(2.0)
+
+
+def test_first_stocks_are_as_given():
+    given = {"density_stems_ha": 700.0, "conifer_fraction": 0.25, "biomass_kgc_m2": 6.0, "soil_kgc_m2": 9.0}
+    still = {name: 0.0 for name in ("recruitment_rate", "natural_mortality", "insect_base_probability",
+                                    "density_dependent_mortality")}  # fmt: skip
+    table = simulate(still, initial={**given, "organic_layer_m": 0.12}, mechanisms={"fire": False})
+    assert table.density_stems_ha[0] == pytest.approx(700.0)
+    assert table.conifer_fraction[0] == pytest.approx(0.25)
+    assert (table.biomass_kgc_m2 - table.biomass_change_kgc_m2)[0] == pytest.approx(6.0)
+    assert (table.soil_kgc_m2 - table.soil_change_kgc_m2)[0] == pytest.approx(9.0)
+    assert table.organic_layer_m[0] == pytest.approx(0.12, abs=0.01)
+
+
+def test_a_site_without_stems_keeps_no_living_carbon():
+    table = simulate(initial={"density_stems_ha": 0.0, "biomass_kgc_m2": 5.0}, years=2)
+    assert table.biomass_kgc_m2[0] == 0.0 and table.mortality_kgc_m2[0] == pytest.approx(5.0)
+    assert table.gpp_kgc_m2[0] == 0.0
+    assert table.density_stems_ha[0] > 0.0  # recruits
+
+
+@pytest.mark.parametrize("minutes", [10, 15, 30, 60, 120])
+def test_any_divisor_of_a_day_is_a_time_step(minutes):
+    table = simulate(time_step_minutes=minutes)
+    assert table.gpp_kgc_m2[0] == pytest.approx(simulate(time_step_minutes=30).gpp_kgc_m2[0], rel=0.1)
+
+
+@pytest.mark.parametrize("mechanism", sim.MECHANISMS)
+def test_every_mechanism_can_be_switched_off(mechanism):
+    burning = {"fire_base_probability": 0.05, "fire_drought_threshold": 0.0, "insect_base_probability": 1.0}
+    initial = {"density_stems_ha": 800.0, "biomass_kgc_m2": 8.0}
+    site = {**burning, "mean_annual_temperature_c": -8.0}
+    on = simulate(site, initial=initial, years=2)
+    off = simulate(site, initial=initial, years=2, mechanisms={mechanism: False})
+    assert not on.equals(off)
+    if mechanism in ("fire", "insects"):
+        column = {"fire": "fire_mortality", "insects": "insect_mortality"}[mechanism]
+        assert on[column].max() > 0.0 and off[column].max() == 0.0
+    if mechanism == "interception":
+        assert off.canopy_sublimation_mm.max() == 0.0 < on.canopy_sublimation_mm.max()
+
+
+# --------------------------------------------------------------------------- what an override leaves unchanged
+
+
+def test_a_site_seed_gives_the_same_site_again():
+    assert sim.sample_site(5) == sim.sample_site(5) != sim.sample_site(6)
+    assert list(sim.sample_site(5)) == list(SITE_PARAMETERS) and len(SITE_PARAMETERS) == 62
+
+
+@pytest.mark.parametrize("name", SITE_PARAMETERS)
+def test_an_override_changes_no_other_parameter(name):
+    value = 0.5 * (SITE_PARAMETERS[name].physical_low + SITE_PARAMETERS[name].physical_high)
+    drawn, overridden = sim.sample_site(5), sim.sample_site(5, {name: value})
+    changed = {other for other in drawn if drawn[other] != overridden[other]}
+    # The latitude is what the mean annual temperature is drawn around.
+    assert changed - {"mean_annual_temperature_c" if name == "latitude_deg" else None} == {name}
+    assert overridden[name] == value
+
+
+def test_an_override_may_be_a_range():
+    q10 = [sim.sample_site(seed, {"q10": (3.0, 3.5)})["q10"] for seed in range(50)]
+    assert min(q10) >= 3.0 and max(q10) <= 3.5 and max(q10) - min(q10) > 0.3
+    assert sim.middle_site({"q10": (3.0, 3.5)})["q10"] == 3.25
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sampled_sites_lie_in_their_ranges(seed):
+    site = sim.sample_site(seed)
+    for name, p in SITE_PARAMETERS.items():
+        assert p.low <= site[name] <= p.high, name
+    scaled = sim.scale_site(site)
+    assert scaled.shape == (62,) and scaled.min() >= 0.0 and scaled.max() <= 1.0
+    names = list(SITE_PARAMETERS)
+    assert scaled[names.index("q10")] == pytest.approx((site["q10"] - 1.8) / 0.5)
+
+
+def test_mean_annual_temperature_follows_latitude():
+    assert mean_annual_temperature(60.5, 0.5) == pytest.approx(-7.5, abs=1e-6)
+    assert mean_annual_temperature(56.0, 0.5) < -5.0  # the upper half of the normal is cut off
+    assert mean_annual_temperature(60.5, 0.8413) == pytest.approx(-7.0, abs=1e-3)  # one standard deviation
+    assert mean_annual_temperature(72.0, 0.5) == -10.0 and mean_annual_temperature(45.0, 0.5) == -5.0
+    for latitude in np.linspace(45.0, 72.0, 10):
+        for uniform in (0.0, 0.3, 0.999999):
+            assert -10.0 <= mean_annual_temperature(latitude, uniform) <= -5.0
+
+
+def test_a_latitude_override_moves_only_the_sun_and_the_mean_temperature():
+    name = "mean_annual_temperature_c"
+    south, north = (sim.sample_site(5, {"latitude_deg": degrees, name: -7.0}) for degrees in (57.0, 64.0))
+    assert {k for k in south if south[k] != north[k]} == {"latitude_deg"}
+    a, b = (simulate(site, output="daily") for site in (south, north))
+    np.testing.assert_allclose(a.air_temperature_c, b.air_temperature_c, atol=1e-9)
+    assert (a.precipitation_mm == b.precipitation_mm).all()
+    assert not np.allclose(a.shortwave_mj_m2, b.shortwave_mj_m2)
+
+
+@pytest.mark.parametrize("action", [0, 4, 20, 24])
+def test_weather_does_not_depend_on_the_policy(action):
+    idle, busy = (simulate(actions=a, years=3, output="daily") for a in (12, action))
+    for name in ("air_temperature_c", "precipitation_mm", "shortwave_mj_m2"):
+        assert (idle[name] == busy[name]).all(), name
+    assert not idle.equals(busy)
+
+
+def test_weather_does_not_depend_on_the_first_stocks():
+    a, b = (simulate(initial={"density_stems_ha": n}, years=2, output="daily") for n in (100.0, 1500.0))
+    for name in ("air_temperature_c", "precipitation_mm", "shortwave_mj_m2"):
+        assert (a[name] == b[name]).all(), name
+
+
+def test_weather_differs_between_seeds_and_years():
+    one, other = simulate(years=2), simulate(years=2, seed=2)
+    assert one.precipitation_mm.nunique() == 2
+    assert (one.precipitation_mm != other.precipitation_mm).all()
+
+
+def test_a_constant_is_an_argument_not_a_recompilation():
+    assert simulate(constants={"light_use_conifer": 2.0}).gpp_kgc_m2[0] > simulate().gpp_kgc_m2[0]
+    for name, constant in CONSTANTS.items():
+        assert constant.physical_low <= constant.low <= constant.physical_high, name
+        assert constant.source and constant.description and constant.unit, name
+
+
+def test_every_site_parameter_has_limits_around_its_range():
+    for name, p in SITE_PARAMETERS.items():
+        assert p.physical_low <= p.low < p.high <= p.physical_high, name
+        assert p.source and p.description and p.unit, name
+
+
+# ---------------------------------------------------------------------------------------------- observed weather
+
+
+def test_observed_weather_is_the_weather():
+    forcing = observed()
+    table = simulate(forcing=forcing)
+    assert table.air_temperature_c[0] == pytest.approx(forcing.air_temperature_c.mean())
+    assert table.precipitation_mm[0] == pytest.approx(forcing.precipitation_mm.sum())
+    assert table.shortwave_mj_m2[0] == pytest.approx(forcing.shortwave_w_m2.mean() * 365 * 0.0864)
+
+
+def test_finer_intervals_are_averaged_and_rain_is_summed():
+    fine = observed(2, minutes=30)
+    (steps,), days = check_forcing(fine, 240, years=1)
+    assert days == 2 and steps.shape == (12, len(FORCING))
+    for name, values in zip(FORCING, steps.T, strict=True):
+        intervals = fine[name].resample("240min")
+        expected = intervals.sum() if name == "precipitation_mm" else intervals.mean()
+        np.testing.assert_allclose(values, expected, rtol=1e-12, err_msg=name)
+
+
+def test_observed_years_are_repeated_in_turn():
+    forcing = pd.concat([observed(start="2018-01-01"), observed(start="2019-01-01", precipitation_mm=0.1)])
+    wet, dry = 0.25 * 365 * 6, 0.1 * 365 * 6
+    assert simulate(forcing=forcing, years=5).precipitation_mm.tolist() == pytest.approx([wet, dry, wet, dry, wet])
+
+
+def test_29_february_is_dropped():
+    leap = observed(366, start="2020-01-01")
+    days = leap.index.normalize()
+    leap.loc[days == "2020-02-29", "precipitation_mm"] = 33.0
+    expected = 0.25 * 365 * 6
+    assert simulate(forcing=leap).precipitation_mm[0] == pytest.approx(expected)
+    assert simulate(forcing=leap[days != "2020-02-29"]).precipitation_mm[0] == pytest.approx(expected)
+
+
+def test_a_part_of_a_year_is_run_as_such():
+    part = simulate(forcing=observed(90), output="daily")
+    assert part.doy.tolist() == list(range(1, 91))
+    assert part.precipitation_mm.sum() == pytest.approx(0.25 * 6 * 90)
+
+
+def test_air_without_wind_at_the_melting_point_is_allowed():
+    table = simulate(forcing=observed(120, air_temperature_c=0.0, wind_speed_m_s=0.0), output="daily")
+    assert np.isfinite(table.drop(columns="albedo").to_numpy()).all()
+
+
+def without(forcing, first, last):
+    """The forcing without the days `first` to `last`, both included."""
+    days = forcing.index.normalize()
+    return forcing[(days < first) | (days > last)]
+
+
+def with_a_gap(column):
+    forcing = observed()
+    forcing.iloc[50, forcing.columns.get_loc(column)] = np.nan
+    return forcing
+
+
+FORCINGS = {
+    "kelvin": (lambda: observed(air_temperature_c=270.0), r"air_temperature_c is 270 at 2019-01-01.*degC.*kelvin"),
+    "percent": (lambda: observed(relative_humidity=70.0), r"relative_humidity is 70 .*\[0, 1.1\].*percent"),
+    "negative light": (lambda: observed(shortwave_w_m2=-2.0), r"shortwave_w_m2 is -2 .*\[0, 1500\] W m-2"),
+    "longwave of nothing": (lambda: observed(longwave_w_m2=0.0), r"longwave_w_m2 is 0 .*\[50, 600\]"),
+    "infinite wind": (lambda: observed(wind_speed_m_s=np.inf), r"wind_speed_m_s is inf .*\[0, 60\] m s-1"),
+    "negative rain": (lambda: observed(precipitation_mm=-1.0), r"precipitation_mm is -1 .*\[0, 200\]"),
+    "gap in temperature": (lambda: with_a_gap("air_temperature_c"), r"air_temperature_c is a gap at 2019-01-09 08:00"),
+    "gap in rain": (lambda: with_a_gap("precipitation_mm"), r"precipitation_mm is a gap at 2019-01-09 08:00"),
+    "text": (lambda: observed(wind_speed_m_s="calm"), r"wind_speed_m_s"),
+    "missing column": (lambda: observed().drop(columns="longwave_w_m2"), r"longwave_w_m2 is missing; needed: air_temp"),
+    "missing row": (lambda: observed().drop(pd.Timestamp("2019-03-05 08:00")), r"not regular at 2019-03-05 12:00"),
+    "missing week before March": (
+        lambda: without(observed(120), "2019-02-20", "2019-02-28"), r"not regular at 2019-03-01"
+    ),
+    "missing weeks of a leap year": (
+        lambda: without(observed(120, start="2020-01-01"), "2020-02-10", "2020-02-29"), r"not regular at 2020-03-01"
+    ),
+    "duplicate times": (lambda: pd.concat([observed().iloc[:1]] * 6), r"2019-01-01 00:00"),
+    "descending times": (lambda: observed(10).iloc[::-1], r"forcing"),
+    "starts in February": (lambda: observed(30, start="2019-02-01"), r"starts at 2019-02-01 00:00.*1 January"),
+    "starts at noon": (lambda: observed(30, start="2019-01-01 12:00"), r"starts at 2019-01-01 12:00.*00:00"),
+    "a year and a bit": (lambda: observed(400), r"forcing of 400 days: whole years of 365 days"),
+    "half a day": (lambda: observed(10.5), r"forcing of 10.5 days.*whole days"),
+    "one row": (lambda: observed().iloc[:1], r"1 row"),
+    "no rows": (lambda: observed().iloc[:0], r"0 rows"),
+    "an array": (lambda: observed().to_numpy(), r"DataFrame with a DatetimeIndex"),
+    "no times": (lambda: observed().reset_index(drop=True), r"DataFrame with a DatetimeIndex"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "message"), FORCINGS.values(), ids=FORCINGS)
+def test_forcing_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        simulate(forcing=make())
+
+
+@pytest.mark.parametrize("minutes", [120, 360])
+def test_a_time_step_that_the_forcing_does_not_fill_is_refused(minutes):
+    with pytest.raises(ValueError, match=rf"time_step_minutes = {minutes}: the forcing comes every 240 minutes"):
+        simulate(forcing=observed(), time_step_minutes=minutes)
+
+
+def test_a_part_of_a_year_is_not_repeated():
+    with pytest.raises(ValueError, match=r"forcing of 90 days.*years=1"):
+        simulate(forcing=observed(90), years=2)
+
+
+# ------------------------------------------------------------------------------------------------------ refusals
+
+BAD = {
+    "unknown parameter": ({"site": {"q11": 2.0}}, r"unknown site parameter 'q11'; did you mean q10"),
+    "parameter beyond its limits": ({"site": {"q10": 9.0}}, r"q10 = 9 is outside its physical limits \[1, 4\]"),
+    "parameter of text": ({"site": {"q10": "2"}}, r"q10: a finite number is allowed, got '2'"),
+    "parameter of nothing": ({"site": {"q10": None}}, r"q10: a finite number"),
+    "parameter not a number": ({"site": {"q10": float("nan")}}, r"q10: a finite number is allowed, got nan"),
+    "range reversed": ({"site": {"q10": (2.2, 1.8)}}, r"q10: range reversed, 2.2 > 1.8"),
+    "range of three": ({"site": {"q10": (1, 2, 3)}}, r"q10: a value or a \(low, high\) pair"),
+    "site of another type": ({"site": [1]}, r"site parameters: a dict .* got list"),
+    "action 25": ({"actions": 25}, r"action 25: integers in \[0, 25\)"),
+    "action -1": ({"actions": -1}, r"action -1: integers in \[0, 25\)"),
+    "action of float": ({"actions": 12.0}, r"actions of type float64: integers"),
+    "action of bool": ({"actions": True}, r"actions of type bool: integers"),
+    "action of text": ({"actions": "plant"}, r"integers in \[0, 25\)"),
+    "too many actions": ({"actions": [12, 12]}, r"actions of shape \(2,\)"),
+    "years 0": ({"years": 0}, r"years: a positive integer is allowed, got 0"),
+    "years of float": ({"years": 2.0}, r"years: a positive integer is allowed, got 2.0"),
+    "seed -1": ({"seed": -1}, r"seed.*-1"),
+    "seed of float": ({"seed": 1.5}, r"seed.*1.5"),
+    "seed of nothing": ({"seed": None}, r"seed.*None"),
+    "time step 7": ({"time_step_minutes": 7}, r"time_step_minutes = 7: a divisor of 1440"),
+    "time step 0": ({"time_step_minutes": 0}, r"time_step_minutes: a positive integer is allowed, got 0"),
+    "time step of float": ({"time_step_minutes": 30.0}, r"time_step_minutes: .*30.0"),
+    "unknown backend": ({"backend": "cuda"}, r"backend 'cuda': allowed are numba, python"),
+    "unknown output": ({"output": "weekly"}, r"output 'weekly': allowed are annual, daily"),
+    "unknown stock": ({"initial": {"carbon": 1}}, r"unknown initial stock 'carbon'; allowed: density_stems_ha"),
+    "negative stock": ({"initial": {"soil_kgc_m2": -1}}, r"initial soil_kgc_m2 = -1: a number in \[0, 100\]"),
+    "stock not a number": ({"initial": {"soil_kgc_m2": float("nan")}}, r"initial soil_kgc_m2 = nan"),
+    "stocks of another type": ({"initial": [1]}, r"initial: a dict .* got list"),
+    "unknown constant": ({"constants": {"par": 1}}, r"unknown constant 'par'"),
+    "constant beyond its limits": ({"constants": {"reference_lai": 99}}, r"reference_lai = 99 .*\[0.5, 10\]"),
+    "soil nodes upside down": (
+        {"constants": {"surface_soil_depth_m": 2.0, "deep_soil_depth_m": 1.0}},
+        r"surface_soil_depth_m.*deep_soil_depth_m",
+    ),
+    "boundary within the soil": ({"constants": {"boundary_depth_m": 3.0}}, r"deep_soil_depth_m.*boundary_depth_m"),
+    "unknown mechanism": ({"mechanisms": {"browsing": False}}, r"unknown mechanism 'browsing'; allowed: moss"),
+    "mechanism half on": ({"mechanisms": {"fire": 0.5}}, r"mechanism 'fire': True or False is allowed, got 0.5"),
+    "half-life 0": ({"hwp_half_life_years": 0}, r"hwp_half_life_years: .*number.* is allowed, got 0"),
+    "half-life of text": ({"hwp_half_life_years": "long"}, r"hwp_half_life_years: .*number.* is allowed, got 'long'"),
+    "class of saplings": ({"harvest_min_class": "sapling"}, r"harvest_min_class 'sapling': allowed are young"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD.values(), ids=BAD)
+def test_bad_input_is_refused_with_the_value_and_what_is_allowed(arguments, message):
+    with pytest.raises(ValueError, match=message) as refusal:
+        simulate(**arguments)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, True, None])
+def test_a_bad_site_seed_is_refused(seed):
+    with pytest.raises(ValueError, match="site_seed"):
+        sim.sample_site(seed)
+
+
+@pytest.mark.parametrize("limits", [(25, 61), (50, 100), (60, 61)])
+def test_the_last_ages_of_the_classes(limits):
+    """The record, and what the observation is made of, agree on the classes."""
+    constants = dict(zip(("young_age_limit", "mature_age_limit"), limits, strict=True))
+    stands = sim.Stands(1, time_step_minutes=240, constants=constants)
+    stands.start([0], [sim.middle_site()], [sim.episode_seeds(1)], {0: {"oldest_age_years": 150.0}})
+    record = dict(zip(sim.RECORD_NAMES, stands.step([12])[0], strict=True))
+    stems = stands.state[0, -2 * AGES :].reshape(2, AGES)
+    edges = [0, 6, 21, limits[0] + 1, limits[1] + 1, AGES]
+    expected = [species[low:high].sum() for species in stems for low, high in zip(edges[:-1], edges[1:], strict=True)]
+    np.testing.assert_allclose([record[name] for name in SPECIES_AND_CLASSES], expected, rtol=1e-12)
+    np.testing.assert_allclose(stands.stocks([0])["age_classes"][0], expected, rtol=1e-12)
+
+
+# ---------------------------------------------------------------------------------------------------- magnitudes
+
+# Bands of mature stands in the generalist climate: ecosystem respiration and GPP [kgC m-2 yr-1], water [mm], ...
+BANDS = {
+    "gpp_kgc_m2": (0.4, 0.8),
+    "respiration": (0.35, 0.75),
+    "evapotranspiration_mm": (150.0, 280.0),
+    "peak_swe_mm": (40.0, 120.0),
+    "snow_off_doy": (98.0, 145.0),
+}
+
+
+@pytest.fixture(scope="module")
+def mature_stands():
+    number = 32
+    stands = sim.Stands(number, time_step_minutes=60, mechanisms={"fire": False})
+    mature = {"density_stems_ha": 1000.0, "conifer_fraction": 0.6, "biomass_kgc_m2": 7.0, "soil_kgc_m2": 8.0,
+              "oldest_age_years": 110.0}  # fmt: skip
+    sites = [sim.sample_site(k) for k in range(number)]
+    stands.start(
+        np.arange(number), sites, [sim.episode_seeds(k) for k in range(number)], dict.fromkeys(range(number), mature)
+    )
+    years = [pd.DataFrame(stands.step(np.full(number, 12)), columns=sim.RECORD_NAMES) for _ in range(3)]
+    mean = sum(years) / len(years)
+    return mean.assign(respiration=mean.autotrophic_respiration_kgc_m2 + mean.heterotrophic_respiration_kgc_m2)
+
+
+@pytest.mark.parametrize(("name", "band"), BANDS.items(), ids=BANDS)
+def test_mature_stands_are_boreal_within_a_factor_of_three(mature_stands, name, band):
+    low, high = band
+    middle = 0.5 * (low + high)
+    assert middle / 3.0 <= mature_stands[name].median() <= 3.0 * middle
+
+
+def test_mature_stands_are_ordered_as_in_nature(mature_stands):
+    m = mature_stands
+    assert (m.summer_albedo < m.winter_albedo).all()
+    assert m.surface_soil_temperature_c.mean() > m.air_temperature_c.mean()
+    efficiency = 1.0 - m.autotrophic_respiration_kgc_m2 / m.gpp_kgc_m2
+    assert 0.35 / 2.0 <= efficiency.median() <= 0.8
+    assert (m.evapotranspiration_mm < m.precipitation_mm + 150.0).all()
+    assert m.air_temperature_c.between(-11.5, -3.5).all()
