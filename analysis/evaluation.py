@@ -146,7 +146,9 @@ def evaluate(args, env_kwargs: dict, policy, weights=None, policies=POLICIES):
             seeds = [FIRST_EVALUATION_SEED + episode for _, episode in chunk]
             with contextlib.closing(make_envs(args.env_id, env_kwargs, len(chunk))) as envs:
                 returns, reports = play(envs, args.env_id, policy, chunk_weights, seeds, kind == "greedy")
-            for (weight, episode), seed, (carbon, thaw), report in zip(chunk, seeds, returns, reports):
+            for (weight, episode), seed, (carbon, thaw), report in zip(
+                chunk, seeds, returns, reports, strict=True
+            ):
                 if "years" in report:
                     records[weight].append(report.pop("years"))
                 rows.append({"policy": kind, "preference": weight, "episode": episode, "seed": seed,

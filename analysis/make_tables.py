@@ -301,7 +301,10 @@ def main(runs_dir: Path = Path("runs"), tables_dir: Path = Path("results/tables"
     if not runs:
         sys.exit(f"error: no finished run under {runs_dir}; these commands make the rows:\n{commands}")
 
-    tables_dir.mkdir(parents=True, exist_ok=True)
+    try:
+        tables_dir.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        sys.exit(f"error: --tables-dir {tables_dir}: cannot write there ({error.strerror})")
     table = main_results(groups)
     text = readable(table, MAIN_HEADINGS)
     write_table(tables_dir / "main_results", table, text)

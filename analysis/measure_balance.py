@@ -1,18 +1,18 @@
 """Measures the one constant of `boreal-balanced-v0`: the carbon scale at which both returns vary equally.
 
-Reference policies, the 25 constant actions (no change where an action is not valid) and the four fixed
-strategies, play the same sites and weathers. The spread of a return is its standard deviation between the policies of one site, pooled over sites. Carbon
-counts as the net change over the carbon scale, before penalties and clipping, so that its spread is in
-proportion to 1 / carbon_scale; thaw as rewarded.
+Reference policies, the 25 constant actions (no change where an action is not valid) and the four fixed strategies,
+play the same sites and weathers. The spread of a return is its standard deviation between the policies of one site,
+pooled over sites. Carbon counts as the net change over the carbon scale, before penalties and clipping, so that its
+spread is in proportion to 1 / carbon_scale; thaw as rewarded.
 """
 
 import sys
 from dataclasses import dataclass
 
 import numpy as np
-import tyro
 
 import boreal_env
+from analysis import protocol
 from analysis.evaluation import final_info
 from baselines_heuristic import conifer_restoration, plus_100, target_density, zero_change
 
@@ -81,4 +81,4 @@ def main(args: Args) -> None:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Args))
+    main(protocol.parse(Args))

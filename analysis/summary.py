@@ -45,8 +45,8 @@ def draw_summary(file, title: str, evaluation: pd.DataFrame, years: pd.DataFrame
 def _draw_learning(axes, episodes: pd.DataFrame) -> None:
     for ax, (column, colour) in zip(axes, OBJECTIVE_COLOURS.items(), strict=True):
         ax.plot(episodes.global_step, episodes[column], ".", markersize=1, color=colour, alpha=0.25)
-        ax.plot(episodes.global_step, episodes[column].rolling(100, min_periods=min(20, len(episodes))).mean(), color=colour,
-                label="mean of the last 100 episodes")
+        mean = episodes[column].rolling(100, min_periods=min(20, len(episodes))).mean()
+        ax.plot(episodes.global_step, mean, color=colour, label="mean of the last 100 episodes")
         ax.set(xlabel="environment steps", ylabel=column.replace("_", " "))
         ax.locator_params(axis="x", nbins=5)
         ax.legend(fontsize=8)

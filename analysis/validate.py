@@ -16,10 +16,9 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pandas as pd
-import tyro
 
 import sim
-from analysis import towers
+from analysis import protocol, towers
 
 MJ_PER_DAY = 0.0864  # MJ m-2 day-1 of 1 W m-2
 NO_CHANGE = 10  # action 5 * 2 + 0: density index 2 leaves the stand alone
@@ -205,7 +204,7 @@ def figure(site: str, fluxes: pd.DataFrame, days: dict[str, pd.DataFrame], model
 
     black, blue, grey = "#222222", "#1f6fb2", "#9a9a9a"
     fig, axes = plt.subplots(4, 1, figsize=(8, 10), sharex=True, layout="constrained")
-    for ax, name in zip(axes, PRINTED):
+    for ax, name in zip(axes[:-1], PRINTED, strict=True):
         values, unit = days[name], QUANTITIES[name][0].replace("month-1", "day-1")
         counted = values["measured"].where(values["counts"])
         ax.plot(values.index, counted, ".", color=grey, ms=4, label="measured, days")
@@ -303,4 +302,4 @@ def main(args: Args) -> None:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Args))
+    main(protocol.parse(Args))

@@ -163,7 +163,7 @@ class Curriculum:
         # a generator of its own: the agent is the one that ppo_gated starts from
         generator = np.random.default_rng(seed)
         sizes = (self.NUM_SITE_INPUTS, 64, 64, 1)
-        self.layers = [generator.normal(0, n**-0.5, (n, m)) for n, m in zip(sizes, sizes[1:])]
+        self.layers = [generator.normal(0, n**-0.5, (n, m)) for n, m in zip(sizes[:-1], sizes[1:], strict=True)]
         self.mean, self.std = 0.0, 1.0
         if not raw and not self.accepts_all:
             logits = self.logit(boreal_env.sample_site_observations(range(1000)))
@@ -381,7 +381,7 @@ if __name__ == "__main__":
         # TRY NOT TO MODIFY: record the update; means over its minibatches
         row = {"iteration": iteration, "global_step": global_step}
         if losses:
-            row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0)))
+            row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0), strict=True))
             row["explained_variance"] = (1 - (y_true - y_pred).var() / y_true.var()).item()
         # CURRICULUM: the threshold of the next rollout's episodes
         num_selected, num_skipped = curriculum.update_threshold()

@@ -353,7 +353,8 @@ def canopy_residual(b):
     for i in range(len(s.swe)):
         w.residual[i], w.slope[i], w.net[i], w.ground_new[i] = canopy_balance(
             w.trial[i], w.fixed[i], w.canopy_sw[i], w.sky[i], w.longwave_cover[i], p.ground_emissivity[i],
-            s.ground[i], w.melt_span[i], w.bare_gain[i], w.ground_base[i], w.ground_by_emission[i], w.ground_by_canopy[i],
+            s.ground[i], w.melt_span[i], w.bare_gain[i],
+            w.ground_base[i], w.ground_by_emission[i], w.ground_by_canopy[i],
             w.trunk_base[i], w.trunk_by_canopy[i], w.trunk_by_ground[i], w.trunk_canopy[i],
             w.air[i], w.canopy_air[i], w.dry_coefficient[i], w.wet_coefficient[i], w.wet_limit[i],
         )  # fmt: skip

@@ -15,7 +15,7 @@ def write_run(folder, script, seed=1, carbon=(0, 1, 2), thaw=(2, 1, 0), env_id="
     """A finished run whose mean returns per weight are the given ones."""
     rows = []
     for policy, shift in (("greedy", 100.0), ("sampled", 0.0)):
-        for weight, c, t in zip(WEIGHTS, carbon, thaw):
+        for weight, c, t in zip(WEIGHTS, carbon, thaw, strict=True):
             for episode, site in enumerate((-1.0, 1.0)):
                 rows.append({"policy": policy, "preference": weight, "episode": episode, "seed": episode,
                              "carbon_return": c + site + shift, "thaw_return": t + 3 * site + shift})

@@ -199,7 +199,7 @@ def test_threshold_path_follows_from_the_episodes(finished_run):
     curriculum, start = make_curriculum(), 0
     for _, update in updates.iterrows():
         ended = episodes[(episodes.global_step > start) & (episodes.global_step <= update.global_step)]
-        curriculum.finished = list(zip(ended.preference, ended.scalarized_return, ended.selected))
+        curriculum.finished = list(zip(ended.preference, ended.scalarized_return, ended.selected, strict=True))
         curriculum.update_threshold()
         assert update.threshold == pytest.approx(curriculum.threshold, rel=1e-8)
         start = update.global_step
