@@ -1,36 +1,18 @@
 """What is done once a day: weather, the canopy's structure, fire, litter; and the day's account at its end."""
-import math
-
 import numpy as np
 
 from sim.canopy import leaf_out, stress_ramp
 from sim.carbon import litter_share
 from sim.demography import OLDEST, count, remove_share
 from sim.disturbance import between, fire_hazard, fire_weather
+from sim.forcing import generated_weather, observed_weather, sun
 from sim.jit import phase
 from sim.mathematics import exponential
 from sim.radiation import canopy_interception
 from sim.snow import AIR_HEAT_CAPACITY, bulk_density, conductivity
 from sim.structure import crown_areas
-from sim.weather import (
-    DAYS_PER_YEAR,
-    FREEZING_POINT_K,
-    SOLAR_CONSTANT,
-    daily_mean_temperature,
-    daily_precipitation,
-    diffuse_share,
-    diurnal_amplitude,
-    drought_index,
-    of_season,
-    precipitation_season,
-    saturation_pressure_water,
-    season,
-    sky_emissivity,
-    solar_declination,
-    solar_distance_factor,
-)
+from sim.weather import DAYS_PER_YEAR, drought_index, season
 
-WET_DAY_MM = 1.0
 GROWING_SEASON_C = 5.0
 SNOW_DAY_MM = 1.0
 SPRING_ENDS = 212  # day of year after which remaining snow is not spring's
@@ -49,122 +31,6 @@ def begin_day(b, day, observed):
     canopy_structure(b, day)
     litter(b, day)
     clear_day(b)
-
-
-@phase
-def sun(b, day):
-    """Coefficients of the cosine of the zenith angle: a + b cos(hour angle)."""
-    w = b.w
-    declination = solar_declination(day)
-    sine, cosine = math.sin(declination), math.cos(declination)
-    distance = solar_distance_factor(day)
-    for i in range(len(b.s.swe)):
-        w.sun_a[i] = w.sin_latitude[i] * sine
-        w.sun_b[i] = w.cos_latitude[i] * cosine
-        w.extraterrestrial[i] = SOLAR_CONSTANT * distance
-
-
-@phase
-def generated_weather(b, day):
-    """The day's weather from the site's climate and the day's draws."""
-    p, w, d = b.p, b.w, b.d
-    angle = 2.0 * math.pi * (day + 0.5) / DAYS_PER_YEAR
-    cosine, sine = math.cos(angle), math.sin(angle)
-    first = day == 0
-    for i in range(len(b.s.swe)):
-        spread = p.daily_noise_std_c[i] * d.temperature_noise[day, i]
-        memory = p.temperature_persistence[i]
-        w.anomaly[i] = spread if first else memory * w.anomaly[i] + math.sqrt(1.0 - memory * memory) * spread
-        temperature = daily_mean_temperature(
-            cosine, sine, w.cos_warmest[i], w.sin_warmest[i],
-            p.mean_annual_temperature_c[i], p.seasonal_amplitude_c[i], w.anomaly[i],
-        )  # fmt: skip
-        kind = precipitation_season(
-            day + 1, temperature, p.summer_start_day[i], p.summer_end_day[i],
-            p.spring_shoulder_start_day[i], p.spring_shoulder_end_day[i],
-            p.autumn_shoulder_start_day[i], p.autumn_shoulder_end_day[i],
-            p.snow_season_end_day[i], p.snow_season_start_day[i],
-        )  # fmt: skip
-        winter, shoulder = kind == 0, kind == 1
-        probability = p.summer_rain_prob[i]
-        mean = p.summer_rain_mm_day[i]
-        sensitivity = p.summer_precip_temp_sensitivity[i]
-        base = p.summer_precip_base_temp_c[i]
-        probability = p.shoulder_rain_prob[i] if shoulder else probability
-        mean = p.shoulder_rain_mm_day[i] if shoulder else mean
-        sensitivity = p.shoulder_precip_temp_sensitivity[i] if shoulder else sensitivity
-        base = p.shoulder_precip_base_temp_c[i] if shoulder else base
-        probability = p.winter_snow_prob[i] if winter else probability
-        mean = p.winter_snow_mm_day[i] if winter else mean
-        sensitivity = p.winter_precip_temp_sensitivity[i] if winter else sensitivity
-        # Rain follows the temperature of the season; snowfall that of the day's weather: cold spells are dry, but
-        # January is not drier than November.
-        departure = w.anomaly[i] * p.snowfall_limit[i] if winter else temperature - base
-        scale = 1.0 + p.snowfall_limit[i] * (p.snowfall_scale[i] - 1.0)
-        mean = mean * scale if winter else mean
-        precipitation = daily_precipitation(
-            d.wet_dice[day, i], d.wet_amount[day, i], probability, mean, sensitivity, departure
-        )
-        wet = precipitation >= WET_DAY_MM
-
-        dry_humidity = of_season(
-            day, p.humidity_dry_winter[i], p.humidity_dry_spring[i], p.humidity_dry_summer[i], p.humidity_dry_autumn[i]
-        )
-        wet_humidity = of_season(
-            day, p.humidity_wet_winter[i], p.humidity_wet_spring[i], p.humidity_wet_summer[i], p.humidity_wet_autumn[i]
-        )
-        humidity = min(max(p.relative_humidity[i] + (wet_humidity if wet else dry_humidity), 0.05), 1.0)
-        w.vapour[i] = humidity * saturation_pressure_water(temperature)
-
-        dry_clearness = of_season(
-            day, p.clearness_dry_winter[i], p.clearness_dry_spring[i],
-            p.clearness_dry_summer[i], p.clearness_dry_autumn[i],
-        )  # fmt: skip
-        wet_clearness = of_season(
-            day, p.clearness_wet_winter[i], p.clearness_wet_spring[i],
-            p.clearness_wet_summer[i], p.clearness_wet_autumn[i],
-        )  # fmt: skip
-        clearness = wet_clearness if wet else dry_clearness
-        dry_cloud = of_season(
-            day, p.cloud_dry_winter[i], p.cloud_dry_spring[i], p.cloud_dry_summer[i], p.cloud_dry_autumn[i]
-        )
-        wet_cloud = of_season(
-            day, p.cloud_wet_cold[i], p.cloud_wet_warm[i], p.cloud_wet_warm[i], p.cloud_wet_cold[i]
-        )  # fmt: skip
-        w.emissivity[i] = sky_emissivity(temperature, w.vapour[i], wet_cloud if wet else dry_cloud)
-        w.top_of_canopy[i] = clearness * w.extraterrestrial[i]
-        w.diffuse[i] = diffuse_share(clearness)
-
-        noon = min(max(w.sun_a[i] + w.sun_b[i], 0.0) / p.diurnal_full_sun[i], 1.0)
-        w.amplitude[i] = diurnal_amplitude(
-            p.diurnal_amplitude_c[i], precipitation, p.rain_diurnal_sensitivity[i], p.rain_diurnal_threshold_mm[i],
-            p.max_diurnal_reduction[i], p.min_diurnal_amplitude_c[i], noon,
-        )  # fmt: skip
-        w.mean_temperature[i] = temperature
-        w.minimum_temperature[i] = temperature - w.amplitude[i]
-        w.precipitation[i] = precipitation
-        w.air_density[i] = 100.0 * p.air_pressure_hpa[i] / (287.05 * (temperature + FREEZING_POINT_K))
-
-
-@phase
-def observed_weather(b, observed):
-    """What the day's processes need from an observed day: its mean, minimum, precipitation and clearness."""
-    p, w = b.p, b.w
-    steps = observed.shape[0]
-    for i in range(len(b.s.swe)):
-        mean, minimum, precipitation, received, possible = 0.0, 1e3, 0.0, 0.0, 0.0
-        for t in range(steps):
-            mean += observed[t, 0, i] / steps
-            minimum = min(minimum, observed[t, 0, i])
-            precipitation += observed[t, 5, i]
-            received += observed[t, 3, i]
-            hour_angle = 2.0 * math.pi * ((t + 0.5) / steps - 0.5)
-            possible += w.extraterrestrial[i] * max(w.sun_a[i] + w.sun_b[i] * math.cos(hour_angle), 0.0)
-        w.mean_temperature[i] = mean
-        w.minimum_temperature[i] = minimum
-        w.precipitation[i] = precipitation
-        w.diffuse[i] = diffuse_share(min(received / possible, 1.0)) if possible > 0.0 else 1.0
-        w.air_density[i] = 100.0 * p.air_pressure_hpa[i] / (287.05 * (mean + FREEZING_POINT_K))
 
 
 @phase

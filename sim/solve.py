@@ -1,0 +1,155 @@
+"""The temperatures of a step: conductances, the nodes' answer to the canopy, and Newton's method for the canopy."""
+from sim.canopy import NEWTON_LIMIT, NEWTON_TOLERANCE, canopy_balance, newton_step
+from sim.jit import phase
+from sim.radiation import black_body, black_body_slope, longwave_down
+from sim.snow import (
+    AIR_HEAT_CAPACITY,
+    ICE_HEAT_CAPACITY,
+    LATENT_HEAT_FUSION,
+    LATENT_HEAT_SUBLIMATION,
+    LATENT_HEAT_VAPORISATION,
+    stability,
+)
+from sim.soil import conductivity, frozen_share, heat_capacity, respond_to_canopy, temperature
+from sim.water import water_stress
+from sim.weather import (
+    FREEZING_POINT_K,
+    PSYCHROMETRIC_PER_HPA,
+    SATURATION_AT_FREEZING_HPA,
+    saturation_pressure,
+    saturation_slope,
+)
+
+
+@phase
+def conductances(b, seconds):
+    """Conductances at the start of the step, evaporation coefficients, and the nodes' answer to the canopy."""
+    s, p, w = b.s, b.p, b.w
+    for i in range(len(s.swe)):
+        slope = saturation_slope(w.air[i], w.saturation[i])
+        equilibrium = slope / (slope + PSYCHROMETRIC_PER_HPA * p.air_pressure_hpa[i])
+        wet_share = s.canopy_rain[i] / w.rain_capacity[i] if w.rain_capacity[i] > 0.0 else 0.0
+        dry = (1.0 - wet_share) * equilibrium * w.leaf_coefficient[i]
+        wet = wet_share * equilibrium * p.priestley_taylor_wet[i]
+        # Above 35 degC Priestley and Taylor's 1.26 would evaporate more than the net radiation.
+        all_of_it = max(dry + wet, 1.0)
+        w.dry_coefficient[i] = dry / all_of_it
+        w.wet_coefficient[i] = wet / all_of_it
+        w.wet_limit[i] = LATENT_HEAT_VAPORISATION * s.canopy_rain[i] / seconds
+
+        velocity = w.ground_velocity[i] * stability(
+            s.ground[i], w.air[i], w.wind_below[i], p.ground_reference_height_m[i],
+            p.stability_factor[i], p.instability_limit[i],
+        )  # fmt: skip
+        w.ground_conductance[i] = max(w.air_density[i] * AIR_HEAT_CAPACITY * velocity, p.minimum_conductance[i])
+
+        emission = black_body(s.ground[i] + FREEZING_POINT_K)
+        emission_slope = black_body_slope(s.ground[i] + FREEZING_POINT_K)
+        snow = s.swe[i] > 0.0
+        ice = min(s.ground[i], 0.0)  # snow that falls on a warm skin is at 0 degC
+        over_ice = saturation_pressure(ice)
+        ice_slope = saturation_slope(ice, over_ice)
+        # No more snow than there is can sublimate within the step, even at 0 degC: the limit is on the conductance,
+        # so that the ground's equation and what is moved agree.
+        drying = max(SATURATION_AT_FREEZING_HPA - w.humidity[i], 1e-3)
+        transfer = min(w.vapour_density[i] * velocity, s.swe[i] / (seconds * drying))
+        stress = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds)
+        sky_and_canopy = longwave_down(w.sky[i], black_body(w.air[i] + FREEZING_POINT_K), w.longwave_cover[i])
+        available = w.ground_sw[i] + p.ground_emissivity[i] * (sky_and_canopy - emission)
+        moist = p.priestley_taylor_ground[i] * equilibrium * stress if w.air[i] > 0.0 else 0.0
+        w.ground_latent[i] = (
+            LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.humidity[i]) if snow else moist * max(available, 0.0)
+        )
+        w.latent_slope[i] = LATENT_HEAT_SUBLIMATION * transfer * ice_slope if snow else 0.0
+
+        w.surface[i] = temperature(
+            s.surface_heat[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], p.soil_freezing_range_k[i]
+        )
+        w.deep[i] = temperature(
+            s.deep_heat[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], p.soil_freezing_range_k[i]
+        )
+        frozen_value = p.soil_conductivity[i] * w.frozen_ratio[i]
+        soil_surface = conductivity(
+            frozen_share(w.surface[i], p.soil_freezing_range_k[i]), p.soil_conductivity[i], frozen_value
+        )
+        soil_deep = conductivity(
+            frozen_share(w.deep[i], p.soil_freezing_range_k[i]), p.soil_conductivity[i], frozen_value
+        )
+        organic = conductivity(
+            frozen_share(0.5 * (s.ground[i] + w.surface[i]), p.soil_freezing_range_k[i]),
+            p.organic_conductivity_thawed[i],
+            p.organic_conductivity_frozen[i],
+        )
+        w.surface_conductance[i] = 1.0 / (
+            s.swe[i] / (w.snow_density[i] * w.snow_conductivity[i])
+            + s.organic_depth[i] * p.moss[i] / organic
+            + w.half_surface[i] / soil_surface
+        )
+        w.deep_conductance[i] = 1.0 / (w.half_surface[i] / soil_surface + w.half_deep[i] / soil_deep)
+        w.boundary_conductance[i] = soil_deep / w.deep_to_boundary[i]
+
+        surface_inertia = (
+            heat_capacity(
+                w.surface[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], p.soil_freezing_range_k[i]
+            )
+            / seconds
+        )
+        deep_inertia = (
+            heat_capacity(w.deep[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], p.soil_freezing_range_k[i])
+            / seconds
+        )
+        (
+            w.deep_base[i], w.deep_by_surface[i], w.surface_base[i], w.surface_by_ground[i], w.trunk_base[i],
+            w.trunk_by_canopy[i], w.trunk_by_ground[i], w.ground_base[i], w.ground_by_emission[i],
+            w.ground_by_canopy[i], stiffness,
+        ) = respond_to_canopy(
+            s.trunk[i], s.trunk_capacity[i] / seconds, w.trunk_canopy[i], w.trunk_air[i], w.trunk_ground[i],
+            s.ground[i], (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) / seconds, w.ground_conductance[i],
+            w.ground_sw[i] + p.ground_emissivity[i] * (1.0 - w.longwave_cover[i]) * w.sky[i]
+            - w.ground_latent[i] + w.latent_slope[i] * (ice - s.ground[i]),
+            emission, emission_slope, w.latent_slope[i], p.ground_emissivity[i], w.longwave_cover[i], w.air[i],
+            w.surface[i], surface_inertia, w.surface_conductance[i],
+            w.deep[i], deep_inertia, w.deep_conductance[i], w.boundary_conductance[i],
+            p.deep_boundary_temperature_k[i] - FREEZING_POINT_K,
+        )  # fmt: skip
+        # At 0 degC some snow sublimates and the rest can melt; beyond, its heat capacity and its vapour are gone.
+        sublimating = (w.ground_latent[i] - w.latent_slope[i] * ice) * seconds / LATENT_HEAT_SUBLIMATION
+        meltable = s.swe[i] - sublimating if snow else 0.0
+        w.melt_span[i] = LATENT_HEAT_FUSION * max(meltable, 0.0) / (seconds * stiffness)
+        w.bare_gain[i] = stiffness / (stiffness - ICE_HEAT_CAPACITY * s.swe[i] / seconds - w.latent_slope[i])
+        w.trial[i] = s.canopy[i]
+        w.low[i] = w.air[i] - 100.0
+        w.high[i] = w.air[i] + 100.0
+
+
+@phase
+def canopy_residual(b):
+    """Residual of the canopy's balance at the trial temperatures; returns whether any lane is still off."""
+    s, p, w = b.s, b.p, b.w
+    for i in range(len(s.swe)):
+        w.residual[i], w.slope[i], w.net[i], w.ground_new[i] = canopy_balance(
+            w.trial[i], w.fixed[i], w.canopy_sw[i], w.sky[i], w.longwave_cover[i], p.ground_emissivity[i],
+            s.ground[i], w.melt_span[i], w.bare_gain[i],
+            w.ground_base[i], w.ground_by_emission[i], w.ground_by_canopy[i],
+            w.trunk_base[i], w.trunk_by_canopy[i], w.trunk_by_ground[i], w.trunk_canopy[i],
+            w.air[i], w.canopy_air[i], w.dry_coefficient[i], w.wet_coefficient[i], w.wet_limit[i],
+        )  # fmt: skip
+    off = 0.0
+    for i in range(len(s.swe)):
+        off += 0.0 if abs(w.residual[i]) <= NEWTON_TOLERANCE else 1.0
+    return off > 0.0
+
+
+@phase
+def solve_canopy(b):
+    """Newton's method for all lanes together; a lane that has converged stays where it is."""
+    w = b.w
+    iterations = 0
+    while canopy_residual(b) and iterations < NEWTON_LIMIT:
+        for i in range(len(w.trial)):
+            proposal, low, high = newton_step(w.trial[i], w.residual[i], w.slope[i], w.low[i], w.high[i])
+            off = abs(w.residual[i]) > NEWTON_TOLERANCE
+            w.trial[i] = proposal if off else w.trial[i]
+            w.low[i] = low
+            w.high[i] = high
+        iterations += 1
