@@ -761,5 +761,6 @@ for _name, _kwargs in {
         id=_name,
         entry_point="boreal_env:BorealEnv",
         vector_entry_point="boreal_env:BorealVectorEnv",
+        disable_env_checker=True,  # it warns at every vector reward
         kwargs=_kwargs,
     )

@@ -23,7 +23,7 @@ def main(path: Path = Path("docs/images/stand.png")) -> None:
     Args:
         path: file of the picture
     """
-    env = gym.make("boreal-generalist-v0", render_mode="rgb_array", disable_env_checker=True)
+    env = gym.make("boreal-generalist-v0", render_mode="rgb_array")
     env.reset(seed=SEED, options={"preference": 0.5})
     for year in range(YEARS):
         env.step(PLANT_100_HALF_CONIFER if year < PLANTING_YEARS else boreal_env.NO_CHANGE)

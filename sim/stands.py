@@ -95,7 +95,7 @@ class Stands:
         self.mechanisms = check_mechanisms(mechanisms)
         self.first_cut_age = first_cut_age(harvest_min_class, self.constants)
         self.products_decay = yearly_decay(hwp_half_life_years)
-        self.threads = threads or len(os.sched_getaffinity(0))
+        self.threads = threads or available_cores()
         self._pool = None
 
         self.parameters = np.zeros((self.number, len(PARAMETER_NAMES)))
@@ -306,6 +306,11 @@ def blocks(number: int) -> list[slice]:
     if number < LANES // 2:
         return [slice(k, k + 1) for k in range(number)]
     return [slice(k, min(k + LANES, number)) for k in range(0, number, LANES)]
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def draw_year(weather, disturbance) -> np.ndarray:
