@@ -110,7 +110,7 @@ class Stands:
         """Put stands at the beginning of an episode: draw their first state and spin it up.
 
         stands : indices; sites : for each, its 62 parameters by name; seeds : for each, its `Seeds`;
-        initial : for each, a dict of first stocks by record name, or None; initial_ranges : ranges that the first
+        initial : position in `stands` -> dict of first stocks by record name; initial_ranges : ranges that the first
         stocks are drawn from, name -> (low, high), instead of `sim.spin_up.INITIAL_RANGES`; observed : a year's
         forcing to spin up with, instead of generated weather (a part of a year is not used).
         """
