@@ -15,15 +15,15 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 import sim
+from sim.demography import AGE_CLASSES
 from sim.management import CONIFER_MIXES, DENSITY_CHANGES, LARGEST_DENSITY, LEAST_DENSITY, NEGLIGIBLE_STEMS, NUM_ACTIONS
 from sim.parameters import check_seed
 from sim.spin_up import check_initial_ranges
-from sim.stands import check_actions, compile_kernels, first_cut_age
+from sim.stands import check_actions, compile_kernels
 
 MODES = ("generalist", "site_specific")
 THAW_FORMULATIONS = ("asymmetric", "contrast", "raw_degree_days")
 NO_CHANGE = 12  # the action that neither plants nor thins
-AGE_CLASSES = ("seedling", "sapling", "young", "mature", "old")
 DEFAULT_YEARS = 50
 
 # ---------------------------------------------------------------------------------------------------------------
@@ -138,7 +138,7 @@ def action_masks(observations: np.ndarray, harvest_min_class: str = "young") -> 
     observations : (n, 43 or more), as the environment gives them; harvest_min_class : "young", "mature" or "old".
     Returns bool, shape (n, 25).
     """
-    first_cut_age(harvest_min_class, {"young_age_limit": 40, "mature_age_limit": 100})
+    _check_choice("harvest_min_class", harvest_min_class, AGE_CLASSES[2:])
     observations = np.atleast_2d(np.asarray(observations, dtype=float))
     if observations.ndim != 2 or observations.shape[1] < _AGE.stop:
         raise ValueError(f"observations of shape {observations.shape}: (n, {_AGE.stop} or more) is allowed")

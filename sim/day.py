@@ -88,13 +88,12 @@ def canopy_structure(b, day):
 
 @phase
 def wind_exchange(b, i, wind):
-    """Exchange velocities of a lane at a wind speed [m s-1]."""
+    """Exchange of a lane's ground [m s-1] and canopy [W m-2 K-1] with the air at a wind speed [m s-1]."""
     p, w = b.p, b.w
     crowns = w.cover_conifer[i] + w.cover_deciduous[i]
     w.wind_below[i] = wind * (1.0 - p.wind_reduction[i] * crowns)
     w.ground_velocity[i] = (w.snow_log[i] if b.s.swe[i] > SNOW_DAY_MM else w.ground_log[i]) * w.wind_below[i]
-    w.canopy_velocity[i] = w.canopy_log[i] * wind
-    exchange = w.air_density[i] * AIR_HEAT_CAPACITY * w.canopy_velocity[i]
+    exchange = w.air_density[i] * AIR_HEAT_CAPACITY * (w.canopy_log[i] * wind)
     w.canopy_air[i] = exchange * max(w.longwave_cover[i], 1e-3)
 
 

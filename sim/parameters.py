@@ -53,7 +53,7 @@ MECHANISMS = {
     "crown_development": "crown growth by species and age (off: both species grow alike)",
     "fire": "stochastic fire",
     "insects": "stochastic insect outbreaks",
-    "snowfall_limit": "snowfall of the records, less in cold spells (off: the site table's, four times too much)",
+    "snowfall_limit": "snowfall of the records, less in cold spells (off: the site table's, 2.4 times as much)",
 }
 
 #: Constants that make sense only in this order.

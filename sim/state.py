@@ -8,7 +8,7 @@ import functools
 
 import numpy as np
 
-from sim.demography import AGES
+from sim.demography import AGE_CLASSES, AGES
 from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS
 
 DAYS = 365
@@ -53,7 +53,7 @@ RECORD = {
     **{
         f"{species}_{age}_stems_ha": ("stems ha-1", f"{species} stems of class {age} at the year's end")
         for species in ("conifer", "deciduous")
-        for age in ("seedling", "sapling", "young", "mature", "old")
+        for age in AGE_CLASSES
     },
     "biomass_kgc_m2": ("kgC m-2", "living trees at the year's end"),
     "soil_kgc_m2": ("kgC m-2", "litter and soil at the year's end"),
@@ -136,7 +136,7 @@ FORCING = (
 _WORK = """
 advected air air_density air_sum amplitude anomaly bare_gain biomass_before boundary_before
 boundary_conductance burnt_stems canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum canopy_sw
-canopy_velocity cos_latitude cos_peak cos_warmest cover_conifer cover_deciduous crown_area deep deep_base
+cos_latitude cos_peak cos_warmest cover_conifer cover_deciduous crown_area deep deep_base
 deep_by_surface deep_conductance deep_frozen deep_latent deep_sum deep_thawed deep_to_boundary deficit
 density_change diffuse dry_coefficient emissivity energy_before energy_gain et_before extraterrestrial
 first_cut_age fixed frozen_ratio gpp_before gpp_conifer gpp_deciduous ground_base ground_by_canopy
