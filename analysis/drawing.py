@@ -330,10 +330,7 @@ def draw_ground(ax, view: View) -> None:
         "surface_soil_temperature_c", temperature(s["surface_heat"], *soil_node(p, "surface"))
     )
     deep = view.last("deep_soil_temperature_c", temperature(s["deep_heat"], *soil_node(p, "deep")))
-    depths = organic + np.array(
-        [0.5 * p["surface_soil_depth_m"], 0.5 * (p["surface_soil_depth_m"] + p["deep_soil_depth_m"]),
-         p["boundary_depth_m"]]
-    )  # fmt: skip
+    depths = organic + np.array([0.5 * p["surface_soil_depth_m"], p["deep_soil_node_m"], p["boundary_depth_m"]])
     temperatures = np.array([surface, deep, boundary])
     active = view.last("active_layer_depth_m")
     swe = view.last("peak_swe_mm", s["swe"])

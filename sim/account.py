@@ -64,5 +64,6 @@ def write_record(b, i):
     r.organic_layer_m[i] = s.organic_depth[i]
     r.active_layer_depth_m[i] = thaw_depth(
         s.organic_depth[i] * p.moss[i], w.surface_max[i], p.surface_soil_depth_m[i], w.thaw_heat[i],
-        w.surface_latent[i] / p.surface_soil_depth_m[i], 2.0 * w.half_deep[i], p.soil_freezing_range_k[i],
+        w.surface_latent[i] / p.surface_soil_depth_m[i], p.boundary_depth_m[i] - p.surface_soil_depth_m[i],
+        p.soil_freezing_range_k[i],
     )  # fmt: skip

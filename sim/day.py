@@ -169,6 +169,7 @@ def clear_day(b):
         w.air_sum[i] = 0.0
         w.canopy_sum[i] = 0.0
         w.ground_sum[i] = 0.0
+        w.top_sum[i] = 0.0
         w.surface_sum[i] = 0.0
         w.deep_sum[i] = 0.0
 
@@ -197,6 +198,7 @@ def end_day(b, day, steps, daily):
         r.max_lai[i] = max(r.max_lai[i], w.lai_conifer[i] + w.lai_deciduous[i])
         r.air_temperature_c[i] += air / DAYS_PER_YEAR
         r.ground_temperature_c[i] += w.ground_sum[i] / (steps * DAYS_PER_YEAR)
+        r.soil_top_temperature_c[i] += w.top_sum[i] / (steps * DAYS_PER_YEAR)
         r.surface_soil_temperature_c[i] += w.surface_sum[i] / (steps * DAYS_PER_YEAR)
         r.deep_soil_temperature_c[i] += w.deep_sum[i] / (steps * DAYS_PER_YEAR)
     if daily.shape[0] > 0:
@@ -231,3 +233,4 @@ def write_day(b, steps, row):
         row[20, i] = w.reflected_sum[i] / w.shortwave_sum[i] if w.shortwave_sum[i] > 0.0 else np.nan
         row[21, i] = w.lai_conifer[i] + w.lai_deciduous[i]
         row[22, i] = s.organic_depth[i]
+        row[23, i] = w.top_sum[i] / steps

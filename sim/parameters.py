@@ -58,8 +58,8 @@ MECHANISMS = {
 
 #: Constants that make sense only in this order.
 ORDERED_CONSTANTS = (
-    ("surface_soil_depth_m", "deep_soil_depth_m"),
-    ("deep_soil_depth_m", "boundary_depth_m"),
+    ("surface_soil_depth_m", "deep_soil_node_m"),
+    ("deep_soil_node_m", "boundary_depth_m"),
     ("tmin_low_conifer", "tmin_high_conifer"),
     ("tmin_low_deciduous", "tmin_high_deciduous"),
     ("vpd_low_hpa", "vpd_high_conifer_hpa"),

@@ -80,13 +80,14 @@ def conductances(b, seconds):
             p.organic_conductivity_thawed[i],
             p.organic_conductivity_frozen[i],
         )
+        w.upper_soil[i] = w.half_surface[i] / soil_surface
         w.surface_conductance[i] = 1.0 / (
             s.swe[i] / (w.snow_density[i] * w.snow_conductivity[i])
             + s.organic_depth[i] * p.moss[i] / organic
-            + w.half_surface[i] / soil_surface
+            + w.upper_soil[i]
         )
-        w.deep_conductance[i] = 1.0 / (w.half_surface[i] / soil_surface + w.half_deep[i] / soil_deep)
-        w.boundary_conductance[i] = soil_deep / w.deep_to_boundary[i]
+        w.deep_conductance[i] = 1.0 / (w.upper_soil[i] + w.above_deep_node[i] / soil_deep)
+        w.boundary_conductance[i] = soil_deep / w.below_deep_node[i]
 
         surface_inertia = (
             heat_capacity(

@@ -101,9 +101,10 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         biomass = min(biomass, density * LARGEST_STEM_KGC * 1e-4) if density > 0.0 else biomass
 
     crowns = 1.0 - math.exp(-density * 1e-4 * parameters["crown_area_conifer_m2"])
-    organic = crowns * (
-        mix * parameters["organic_depth_conifer_m"] + (1.0 - mix) * parameters["organic_depth_deciduous_m"]
-    ) + (1.0 - crowns) * parameters["organic_depth_open_m"]
+    organic = (
+        crowns * (mix * parameters["organic_depth_conifer_m"] + (1.0 - mix) * parameters["organic_depth_deciduous_m"])
+        + (1.0 - crowns) * parameters["organic_depth_open_m"]
+    )
     mean = parameters["mean_annual_temperature_c"]
     boundary = parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K
     winter = mean - parameters["seasonal_amplitude_c"]
@@ -148,7 +149,7 @@ def stems_of_classes(stocks: dict, parameters: dict) -> np.ndarray:
 def soil_node(parameters: dict, node: str) -> tuple[float, float, float, float]:
     """Heat capacities thawed and frozen [J m-2 K-1], latent heat [J m-2] and freezing range [K] of a soil node."""
     surface = parameters["surface_soil_depth_m"]
-    thickness = surface if node == "surface" else parameters["deep_soil_depth_m"] - surface
+    thickness = surface if node == "surface" else parameters["boundary_depth_m"] - surface
     freezes = parameters["soil_freezing"]
     thawed = parameters["soil_heat_capacity_thawed"]
     frozen = thawed + freezes * (parameters["soil_heat_capacity_frozen"] - thawed)

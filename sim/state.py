@@ -86,6 +86,7 @@ RECORD = {
     "ground_shortwave_mj_m2": ("MJ m-2", "shortwave absorbed by ground and snow"),
     "air_temperature_c": ("degC", "annual mean"),
     "ground_temperature_c": ("degC", "annual mean of snow surface or skin"),
+    "soil_top_temperature_c": ("degC", "annual mean at the top of the mineral soil"),
     "surface_soil_temperature_c": ("degC", "annual mean"),
     "deep_soil_temperature_c": ("degC", "annual mean"),
     "active_layer_depth_m": ("m", "deepest thaw, from the organic surface"),
@@ -124,6 +125,7 @@ DAILY = (
     "latent_heat_mj_m2", "ground_heat_mj_m2", "boundary_heat_mj_m2", "evapotranspiration_mm", "runoff_mm", "swe_mm",
     "canopy_snow_mm", "soil_water_mm", "canopy_temperature_c", "ground_temperature_c", "surface_soil_temperature_c",
     "deep_soil_temperature_c", "albedo", "lai", "organic_layer_m",
+    "soil_top_temperature_c",
 )  # fmt: skip
 
 #: Columns of an observed forcing, in order.
@@ -134,25 +136,25 @@ FORCING = (
 
 #: What a step, a day or a year computes and hands on; nothing here lasts beyond the year.
 _WORK = """
-advected air air_density air_sum amplitude anomaly bare_gain biomass_before boundary_before
-boundary_conductance burnt_stems canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum canopy_sw
-cos_latitude cos_peak cos_warmest cover_conifer cover_deciduous crown_area deep deep_base
-deep_by_surface deep_conductance deep_frozen deep_latent deep_sum deep_thawed deep_to_boundary deficit
-density_change diffuse dry_coefficient emissivity energy_before energy_gain et_before extraterrestrial
-first_cut_age fixed frozen_ratio gpp_before gpp_conifer gpp_deciduous ground_base ground_by_canopy
-ground_by_emission ground_conductance ground_latent ground_log ground_new ground_sum ground_sw ground_velocity
-half_deep half_surface high humidity infiltration lai_conifer lai_deciduous latent_before latent_slope
-leaf_coefficient leaf_conifer leaf_deciduous light_use_conifer light_use_deciduous log_q10 longwave_cover low
-mean_temperature melt_span minimum_temperature mix net net_before optical_conifer optical_deciduous
-precipitation precipitation_step products_before products_decay ra_before rain rain_capacity reflected
-reflected_sum residual rh_before runoff_before saturation sensible_before share_conifer shortwave
-shortwave_sum sin_latitude sin_peak sin_warmest sky sky_conifer sky_deciduous slope snow snow_area
-snow_conductivity snow_density snow_efficiency snow_log soil_before soil_heat_sum stems_before stems_gain
-summer_down summer_up sun_a sun_b surface surface_base surface_by_ground surface_conductance surface_frozen
-surface_latent surface_max surface_sum surface_thawed sw_before temperature_stress_conifer
-temperature_stress_deciduous thaw_heat top_of_canopy transpiration_conifer transpiration_deciduous trial
-trunk_air trunk_base trunk_by_canopy trunk_by_ground trunk_canopy trunk_ground vapour vapour_density
-water_before water_gain wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up
+above_deep_node advected air air_density air_sum amplitude anomaly bare_gain below_deep_node biomass_before
+boundary_before boundary_conductance burnt_stems canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum
+canopy_sw cos_latitude cos_peak cos_warmest cover_conifer cover_deciduous crown_area deep deep_base
+deep_by_surface deep_conductance deep_frozen deep_latent deep_sum deep_thawed deficit density_change diffuse
+dry_coefficient emissivity energy_before energy_gain et_before extraterrestrial first_cut_age fixed frozen_ratio
+gpp_before gpp_conifer gpp_deciduous ground_base ground_by_canopy ground_by_emission ground_conductance
+ground_latent ground_log ground_new ground_sum ground_sw ground_velocity half_surface high humidity infiltration
+lai_conifer lai_deciduous latent_before latent_slope leaf_coefficient leaf_conifer leaf_deciduous
+light_use_conifer light_use_deciduous log_q10 longwave_cover low mean_temperature melt_span minimum_temperature
+mix net net_before optical_conifer optical_deciduous precipitation precipitation_step products_before
+products_decay ra_before rain rain_capacity reflected reflected_sum residual rh_before runoff_before saturation
+sensible_before share_conifer shortwave shortwave_sum sin_latitude sin_peak sin_warmest sky sky_conifer
+sky_deciduous slope snow snow_area snow_conductivity snow_density snow_efficiency snow_log soil_before
+soil_heat_sum soil_top stems_before stems_gain summer_down summer_up sun_a sun_b surface surface_base
+surface_by_ground surface_conductance surface_frozen surface_latent surface_max surface_sum surface_thawed
+sw_before temperature_stress_conifer temperature_stress_deciduous thaw_heat top_of_canopy top_sum
+transpiration_conifer transpiration_deciduous trial trunk_air trunk_base trunk_by_canopy trunk_by_ground
+trunk_canopy trunk_ground upper_soil vapour vapour_density water_before water_gain wet_coefficient wet_limit
+wind_below winter_air winter_days winter_down winter_up
 """.split()
 
 

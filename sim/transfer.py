@@ -63,6 +63,7 @@ def move_energy_and_water(b, seconds):
         s.swe[i] -= melted
         s.ground[i] = heat / (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i])
 
+        w.soil_top[i] = surface + ground_to_surface * w.upper_soil[i]
         s.canopy[i] = canopy
         s.trunk[i] += seconds * (canopy_to_trunk - trunk_heat - trunk_to_ground) / s.trunk_capacity[i]
         s.surface_heat[i] += seconds * (ground_to_surface - surface_to_deep)
@@ -108,6 +109,7 @@ def move_energy_and_water(b, seconds):
         w.air_sum[i] += w.air[i]
         w.canopy_sum[i] += canopy
         w.ground_sum[i] += s.ground[i]
+        w.top_sum[i] += w.soil_top[i]
         w.surface_sum[i] += w.surface[i]
         w.deep_sum[i] += w.deep[i]
         w.surface_max[i] = max(w.surface_max[i], w.surface[i])
@@ -130,12 +132,10 @@ def move_carbon(b, seconds):
             p.maintenance_leaf_share[i], p.reference_lai[i], p.reference_biomass_kgc_m2[i],
         )  # fmt: skip
         conifer = autotrophic(w.gpp_conifer[i], conifer, p.growth_respiration[i], s.conifer_biomass[i], seconds)
-        deciduous = autotrophic(
-            w.gpp_deciduous[i], deciduous, p.growth_respiration[i], s.deciduous_biomass[i], seconds
-        )
+        deciduous = autotrophic(w.gpp_deciduous[i], deciduous, p.growth_respiration[i], s.deciduous_biomass[i], seconds)
         soil = (
             p.soil_respiration[i] * s.soil_carbon[i] / (p.reference_soil_carbon[i] * SECONDS_PER_YEAR) * seconds
-            * q10_factor(w.surface[i], p.respiration_reference_c[i], w.log_q10[i])
+            * q10_factor(w.soil_top[i], p.respiration_reference_c[i], w.log_q10[i])
         )  # fmt: skip
         s.conifer_biomass[i] += w.gpp_conifer[i] * seconds - conifer
         s.deciduous_biomass[i] += w.gpp_deciduous[i] * seconds - deciduous

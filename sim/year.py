@@ -85,9 +85,7 @@ def manage(b, i):
         r.planted_stems_ha[i] = change
     elif change < 0.0:
         cut = -change
-        cut_conifers = conifers_to_cut(
-            cut, w.mix[i], conifers, deciduous, harvestable_conifers, harvestable_deciduous
-        )
+        cut_conifers = conifers_to_cut(cut, w.mix[i], conifers, deciduous, harvestable_conifers, harvestable_deciduous)
         young, mature = int(p.young_age_limit[i]), int(p.mature_age_limit[i])
         share_conifer = cut_oldest(
             s.conifer_stems, i, cut_conifers, first_age, young, mature,
@@ -141,7 +139,7 @@ def site_constants(b, i):
 
     freezes = p.soil_freezing[i]
     surface = p.surface_soil_depth_m[i]
-    deep = p.deep_soil_depth_m[i] - surface
+    deep = p.boundary_depth_m[i] - surface
     thawed = p.soil_heat_capacity_thawed[i]
     frozen = thawed + freezes * (p.soil_heat_capacity_frozen[i] - thawed)
     latent = freezes * LATENT_HEAT_FUSION * WATER_DENSITY * p.soil_freezing_water[i]
@@ -150,8 +148,8 @@ def site_constants(b, i):
     w.surface_latent[i], w.deep_latent[i] = latent * surface, latent * deep
     w.frozen_ratio[i] = 1.0 + freezes * (p.soil_frozen_conductivity_ratio[i] - 1.0)
     w.half_surface[i] = 0.5 * surface
-    w.half_deep[i] = 0.5 * deep
-    w.deep_to_boundary[i] = p.boundary_depth_m[i] - surface - 0.5 * deep
+    w.above_deep_node[i] = p.deep_soil_node_m[i] - surface
+    w.below_deep_node[i] = p.boundary_depth_m[i] - p.deep_soil_node_m[i]
 
 
 @phase
