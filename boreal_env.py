@@ -15,11 +15,19 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 import sim
+from sim.block import compile_kernels
 from sim.demography import AGE_CLASSES
-from sim.management import CONIFER_MIXES, DENSITY_CHANGES, LARGEST_DENSITY, LEAST_DENSITY, NEGLIGIBLE_STEMS, NUM_ACTIONS
+from sim.management import (
+    CONIFER_MIXES,
+    DENSITY_CHANGES,
+    LARGEST_DENSITY,
+    LEAST_DENSITY,
+    NEGLIGIBLE_STEMS,
+    NUM_ACTIONS,
+    check_actions,
+)
 from sim.parameters import check_seed
 from sim.spin_up import check_initial_ranges
-from sim.stands import check_actions, compile_kernels
 
 MODES = ("generalist", "site_specific")
 THAW_FORMULATIONS = ("asymmetric", "contrast", "raw_degree_days")

@@ -17,8 +17,7 @@ from sim import soil
 from sim.demography import AGES
 from sim.jit import uncompiled
 from sim.spin_up import soil_node
-from sim.stands import PARAMETER_NAMES
-from sim.state import STATE
+from sim.state import PARAMETER_NAMES, STATE
 from sim.weather import FREEZING_POINT_K
 
 temperature = uncompiled(soil.temperature)

@@ -3,11 +3,14 @@
 `simulate` runs one stand and returns a table; `Stands` steps many, for the environment. `sample_site` draws the 62
 parameters of a site. `docs/model.md` has the equations.
 """
+from sim.closure import PhysicsError
+from sim.draws import Seeds, episode_seeds
 from sim.jit import cache_folder
 from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS, middle_site, sample_site, scale_site
-from sim.simulate import episode_seeds, simulate
+from sim.simulate import simulate
 from sim.spin_up import INITIAL_RANGES
-from sim.stands import RECORD_NAMES, PhysicsError, Seeds, Stands
+from sim.stands import Stands
+from sim.state import RECORD_NAMES
 
 __all__ = [
     "CONSTANTS", "INITIAL_RANGES", "MECHANISMS", "RECORD_NAMES", "SITE_PARAMETERS", "PhysicsError", "Seeds", "Stands",

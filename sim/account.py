@@ -15,7 +15,6 @@ def clear_year(b, i):
     w.products_before[i] = s.products[i]
     w.stems_before[i] = count(s.conifer_stems, i, 0, OLDEST) + count(s.deciduous_stems, i, 0, OLDEST)
     w.stems_gain[i] = 0.0
-    w.burnt_stems[i] = 0.0
     w.summer_up[i] = 0.0
     w.summer_down[i] = 0.0
     w.winter_up[i] = 0.0

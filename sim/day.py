@@ -3,15 +3,13 @@ import numpy as np
 
 from sim.canopy import leaf_out, stress_ramp
 from sim.carbon import litter_share
-from sim.demography import OLDEST, count, remove_share
-from sim.disturbance import between, fire_hazard, fire_weather
+from sim.disturbance import fire
 from sim.forcing import generated_weather, observed_weather, sun
 from sim.jit import phase
 from sim.mathematics import exponential
 from sim.radiation import canopy_interception
 from sim.snow import AIR_HEAT_CAPACITY, bulk_density, conductivity
-from sim.structure import crown_areas
-from sim.weather import DAYS_PER_YEAR, drought_index, season
+from sim.weather import DAYS_PER_YEAR, season
 
 GROWING_SEASON_C = 5.0
 SNOW_DAY_MM = 1.0
@@ -95,41 +93,6 @@ def wind_exchange(b, i, wind):
     w.ground_velocity[i] = (w.snow_log[i] if b.s.swe[i] > SNOW_DAY_MM else w.ground_log[i]) * w.wind_below[i]
     exchange = w.air_density[i] * AIR_HEAT_CAPACITY * (w.canopy_log[i] * wind)
     w.canopy_air[i] = exchange * max(w.longwave_cover[i], 1e-3)
-
-
-@phase
-def fire(b, day, i):
-    """Drought index of the day, and a fire if dice, drought and warmth agree; at most one a year."""
-    s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
-    s.drought[i] = drought_index(
-        s.drought[i], w.mean_temperature[i], w.precipitation[i], s.swe[i], p.drought_evaporation[i]
-    )
-    r.drought_index[i] = max(r.drought_index[i], s.drought[i])
-    hazard = fire_hazard(
-        p.fire_base_probability[i], w.cover_conifer[i], w.cover_deciduous[i],
-        p.flammability_conifer[i], p.flammability_deciduous[i],
-    )  # fmt: skip
-    summer = p.summer_start_day[i] <= day + 1 < p.summer_end_day[i]
-    ready = fire_weather(s.drought[i], w.mean_temperature[i], p.fire_drought_threshold[i], p.fire_temperature_c[i])
-    if not (summer and ready and p.fire[i] > 0.0 and r.fire_mortality[i] == 0.0 and d.fire_dice[day, i] < hazard):
-        return
-    killed = between(p.fire_kill_low[i], p.fire_kill_high[i], d.fire_kill[i])
-    w.burnt_stems[i] = killed * (count(s.conifer_stems, i, 0, OLDEST) + count(s.deciduous_stems, i, 0, OLDEST))
-    remove_share(s.conifer_stems, i, 0, OLDEST, killed)
-    remove_share(s.deciduous_stems, i, 0, OLDEST, killed)
-    conifer, deciduous = killed * s.conifer_biomass[i], killed * s.deciduous_biomass[i]
-    burned = p.fire_combusted_conifer[i] * conifer + p.fire_combusted_deciduous[i] * deciduous
-    s.conifer_biomass[i] -= conifer
-    s.deciduous_biomass[i] -= deciduous
-    share = between(p.fire_organic_low[i], p.fire_organic_high[i], d.fire_depth[i])
-    depth = share * s.organic_depth[i]
-    soil = min(depth * p.organic_carbon_density[i], share * s.soil_carbon[i])
-    s.organic_depth[i] -= depth
-    s.soil_carbon[i] += conifer + deciduous - burned - soil
-    r.fire_mortality[i] = killed
-    r.fire_mortality_kgc_m2[i] += conifer + deciduous - burned
-    r.fire_loss_kgc_m2[i] += burned + soil
-    crown_areas(b, i)
 
 
 @phase

@@ -1,5 +1,8 @@
-"""Fire and insects: hazards and shares. Their dice are drawn before the year begins."""
-from sim.jit import compiled
+"""Fire and insects: their hazards, and what they do to a stand. Their dice are drawn before the year begins."""
+from sim.demography import OLDEST, count, remove_share
+from sim.jit import compiled, phase
+from sim.structure import crown_areas
+from sim.weather import drought_index
 
 
 @compiled
@@ -25,3 +28,66 @@ def outbreak_probability(base, winter_temperature, density, lethal, mild, refere
     """Yearly probability of an insect outbreak: grows with a mild winter (overwintering) and with density."""
     survival = min(max((winter_temperature - lethal) / (mild - lethal), 0.0), 1.0)
     return base * survival * min(density / reference_density, 1.0)
+
+
+@phase
+def fire(b, day, i):
+    """Drought index of the day, and a fire if dice, drought and warmth agree; at most one a year."""
+    s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
+    s.drought[i] = drought_index(
+        s.drought[i], w.mean_temperature[i], w.precipitation[i], s.swe[i], p.drought_evaporation[i]
+    )
+    r.drought_index[i] = max(r.drought_index[i], s.drought[i])
+    hazard = fire_hazard(
+        p.fire_base_probability[i], w.cover_conifer[i], w.cover_deciduous[i],
+        p.flammability_conifer[i], p.flammability_deciduous[i],
+    )  # fmt: skip
+    summer = p.summer_start_day[i] <= day + 1 < p.summer_end_day[i]
+    ready = fire_weather(s.drought[i], w.mean_temperature[i], p.fire_drought_threshold[i], p.fire_temperature_c[i])
+    if not (summer and ready and p.fire[i] > 0.0 and r.fire_mortality[i] == 0.0 and d.fire_dice[day, i] < hazard):
+        return
+    killed = between(p.fire_kill_low[i], p.fire_kill_high[i], d.fire_kill[i])
+    w.stems_gain[i] -= killed * (count(s.conifer_stems, i, 0, OLDEST) + count(s.deciduous_stems, i, 0, OLDEST))
+    remove_share(s.conifer_stems, i, 0, OLDEST, killed)
+    remove_share(s.deciduous_stems, i, 0, OLDEST, killed)
+    conifer, deciduous = killed * s.conifer_biomass[i], killed * s.deciduous_biomass[i]
+    burned = p.fire_combusted_conifer[i] * conifer + p.fire_combusted_deciduous[i] * deciduous
+    s.conifer_biomass[i] -= conifer
+    s.deciduous_biomass[i] -= deciduous
+    share = between(p.fire_organic_low[i], p.fire_organic_high[i], d.fire_depth[i])
+    depth = share * s.organic_depth[i]
+    soil = min(depth * p.organic_carbon_density[i], share * s.soil_carbon[i])
+    s.organic_depth[i] -= depth
+    s.soil_carbon[i] += conifer + deciduous - burned - soil
+    r.fire_mortality[i] = killed
+    r.fire_mortality_kgc_m2[i] += conifer + deciduous - burned
+    r.fire_loss_kgc_m2[i] += burned + soil
+    crown_areas(b, i)
+
+
+@phase
+def insects(b, i):
+    """An outbreak, if dice, the past winter and density agree; the dead go to the soil."""
+    s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
+    conifers = count(s.conifer_stems, i, 0, OLDEST)
+    deciduous = count(s.deciduous_stems, i, 0, OLDEST)
+    density = conifers + deciduous
+    winter = w.winter_air[i] / w.winter_days[i] if w.winter_days[i] > 0.0 else 0.0
+    probability = outbreak_probability(
+        p.insect_base_probability[i], winter, density, p.insect_lethal_c[i], p.insect_mild_c[i], p.insect_density[i]
+    )
+    if not (p.insects[i] > 0.0 and d.insect_dice[i] < probability):
+        return
+    dies_conifer = p.insect_mortality_rate[i]
+    dies_deciduous = dies_conifer * p.insect_deciduous[i]
+    remove_share(s.conifer_stems, i, 0, OLDEST, dies_conifer)
+    remove_share(s.deciduous_stems, i, 0, OLDEST, dies_deciduous)
+    dead_conifer = dies_conifer * s.conifer_biomass[i]
+    dead_deciduous = dies_deciduous * s.deciduous_biomass[i]
+    s.conifer_biomass[i] -= dead_conifer
+    s.deciduous_biomass[i] -= dead_deciduous
+    s.soil_carbon[i] += dead_conifer + dead_deciduous
+    killed = dies_conifer * conifers + dies_deciduous * deciduous
+    w.stems_gain[i] -= killed
+    r.mortality_kgc_m2[i] += dead_conifer + dead_deciduous
+    r.insect_mortality[i] = killed / density if density > 0.0 else 0.0

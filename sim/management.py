@@ -4,7 +4,7 @@ One rule, `feasible_change`, serves the transition here, the action mask and the
 """
 import numpy as np
 
-from sim.demography import OLDEST, count, remove_share, total_weight
+from sim.demography import AGE_CLASSES, OLDEST, SAPLING_LIMIT, count, remove_share, total_weight
 from sim.jit import compiled
 
 DENSITY_CHANGES = (-100.0, -50.0, 0.0, 50.0, 100.0)  # stems ha-1
@@ -19,6 +19,31 @@ def decode(actions) -> tuple[np.ndarray, np.ndarray]:
     """Density change [stems ha-1] and conifer share of integer actions, a = 5 x density index + mix index."""
     actions = np.asarray(actions)
     return np.take(DENSITY_CHANGES, actions // 5), np.take(CONIFER_MIXES, actions % 5)
+
+
+def check_actions(actions, number) -> np.ndarray:
+    """Actions as integers, shape (number,). Raises ValueError naming the first that is not in [0, 25)."""
+    values = np.asarray(actions)
+    if values.shape != (number,):
+        raise ValueError(f"actions of shape {values.shape}: one integer for each of {number} stands is allowed")
+    if not np.issubdtype(values.dtype, np.integer):
+        raise ValueError(f"actions of type {values.dtype}: integers in [0, {NUM_ACTIONS}) are allowed")
+    wrong = values[(values < 0) | (values >= NUM_ACTIONS)]
+    if wrong.size:
+        raise ValueError(f"action {wrong[0]}: integers in [0, {NUM_ACTIONS}) are allowed")
+    return values
+
+
+def first_cut_age(harvest_min_class: str, constants: dict) -> int:
+    """Youngest age that thinning may cut, from the name of its age class."""
+    ages = {
+        "young": SAPLING_LIMIT + 1,
+        "mature": int(constants["young_age_limit"]) + 1,
+        "old": int(constants["mature_age_limit"]) + 1,
+    }
+    if not isinstance(harvest_min_class, str) or harvest_min_class not in ages:
+        raise ValueError(f"harvest_min_class {harvest_min_class!r}: allowed are {', '.join(AGE_CLASSES[2:])}")
+    return ages[harvest_min_class]
 
 
 @compiled

@@ -2,10 +2,12 @@
 import numpy as np
 import pandas as pd
 
-from sim.parameters import check_seed, middle_site
+from sim.draws import episode_seeds
+from sim.management import check_actions
+from sim.parameters import middle_site
 from sim.spin_up import check_initial
-from sim.stands import RECORD_NAMES, Seeds, Stands, check_actions
-from sim.state import DAILY, DAYS, FORCING
+from sim.stands import Stands
+from sim.state import DAILY, DAYS, FORCING, RECORD_NAMES
 
 #: Allowed values of an observed forcing: column -> (low, high, unit, hint).
 FORCING_LIMITS = {
@@ -16,12 +18,6 @@ FORCING_LIMITS = {
     "longwave_w_m2": (50.0, 600.0, "W m-2", ""),
     "precipitation_mm": (0.0, 200.0, "mm per interval", ""),
 }
-
-
-def episode_seeds(seed: int) -> Seeds:
-    """Seeds of an episode's start, weather and disturbance, from one integer."""
-    seed = check_seed("seed", seed)
-    return Seeds(*(int(s) for s in np.random.SeedSequence(seed).generate_state(3, np.uint64) >> np.uint64(1)))
 
 
 def simulate(

@@ -4,19 +4,18 @@ Each stand's parameters, state, draws and record are rows of four arrays, (stand
 sixteen stands into the lanes of a block, calls the compiled kernel, and copies them back; blocks run on a pool of
 threads. So any subset of stands can be stepped together, in any order, with the same bits.
 """
-import functools
 import os
 from concurrent.futures import ThreadPoolExecutor
 from numbers import Real
-from types import SimpleNamespace
-from typing import NamedTuple
 
 import numpy as np
 
-from sim.demography import AGE_CLASSES, AGES, SAPLING_LIMIT, SEEDLING_LIMIT
-from sim.jit import specialised, uncompiled
-from sim.management import NUM_ACTIONS, decode
-from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS, check_constants, check_mechanisms
+from sim.block import BACKENDS, blocks, run_block
+from sim.closure import check_closure
+from sim.demography import AGES, SAPLING_LIMIT, SEEDLING_LIMIT
+from sim.draws import Seeds, draw_slice, draw_year, restored_generator
+from sim.management import check_actions, first_cut_age
+from sim.parameters import check_constants, check_mechanisms
 from sim.spin_up import (
     INITIAL_RANGES,
     SPIN_UP_STEPS_PER_DAY,
@@ -26,40 +25,17 @@ from sim.spin_up import (
     first_state,
     next_deep_heat,
 )
-from sim.state import DAILY, DAYS, DRAWS, RECORD, STATE, block_dtype
-from sim.year import simulate_year
-
-LANES = 16
-BACKENDS = ("numba", "python")
-
-#: Largest failure to close that a year may show: record column -> tolerance (its unit). Carbon and stems scale
-#: with the stock, whose round-off they contain.
-TOLERANCES = {
-    "energy_residual_w_m2": 1e-6,
-    "canopy_residual_w_m2": 1e-6,
-    "water_residual_mm": 1e-9,
-    "carbon_residual_kgc_m2": 1e-12,
-    "annual_carbon_residual_kgc_m2": 1e-9,
-    "stems_residual_ha": 1e-9,
-}
-
-PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS)
-STATE_NAMES = tuple(STATE)
-RECORD_NAMES = tuple(RECORD)
-STATE_SIZE = len(STATE) + 2 * AGES
-DRAWS_SIZE = sum(DAYS if daily else 1 for daily, _ in DRAWS.values())
-
-
-class Seeds(NamedTuple):
-    """Seeds of an episode's independent random streams."""
-
-    start: int
-    weather: int
-    disturbance: int
-
-
-class PhysicsError(RuntimeError):
-    """A year that failed to close or left the finite numbers, with what is needed to replay it."""
+from sim.state import (
+    DAILY,
+    DAYS,
+    DRAWS_SIZE,
+    PARAMETER_NAMES,
+    RECORD,
+    RECORD_NAMES,
+    STATE,
+    STATE_NAMES,
+    STATE_SIZE,
+)
 
 
 class Stands:
@@ -136,7 +112,7 @@ class Stands:
         deep, surface = STATE_NAMES.index("deep_heat"), RECORD_NAMES.index("surface_soil_temperature_c")
         draws = np.zeros((len(stands), DRAWS_SIZE))
         for name, values in climate_draws().items():
-            draws[:, _draw_slice(name)] = values
+            draws[:, draw_slice(name)] = values
         nothing = np.full(len(stands), 12)
         steps = self.steps_per_day if observed is not None else min(self.steps_per_day, SPIN_UP_STEPS_PER_DAY)
         heat_before = gain_before = None
@@ -215,8 +191,8 @@ class Stands:
         self.parameters, self.state = state["parameters"].copy(), state["state"].copy()
         self.record, self.years = state["record"].copy(), state["years"].copy()
         self.seeds = list(state["seeds"])
-        self._weather = [_generator(g) for g in state["weather"]]
-        self._disturbance = [_generator(g) for g in state["disturbance"]]
+        self._weather = [restored_generator(g) for g in state["weather"]]
+        self._disturbance = [restored_generator(g) for g in state["disturbance"]]
 
     def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None, steps_per_day=None):
         """The new states and records of a year, without touching anything: (stands, fields) each."""
@@ -225,9 +201,10 @@ class Stands:
 
         def run(chunk):
             rows = None if daily is None else daily[chunk]
-            state[chunk], record[chunk] = self._run_block(
+            state[chunk], record[chunk] = run_block(
                 self.parameters[stands[chunk]], self.state[stands[chunk]], draws[chunk], actions[chunk],
-                observed, days, rows, steps_per_day or self.steps_per_day,
+                observed, days, rows, steps_per_day=steps_per_day or self.steps_per_day, backend=self.backend,
+                first_cut_age=self.first_cut_age, products_decay=self.products_decay,
             )  # fmt: skip
 
         chunks = blocks(len(stands))
@@ -240,59 +217,11 @@ class Stands:
             list(self._pool.map(run, chunks))
         return state, record
 
-    def _run_block(self, parameters, state, draws, actions, observed, days, daily, steps_per_day):
-        """One call of the kernel. Lanes that are left over repeat the last stand."""
-        number = len(parameters)
-        lanes = LANES if number > 1 else 1
-        block = np.zeros(1, block_dtype(lanes))
-        rows = block.view("f8").reshape(-1, lanes)
-        fill = np.minimum(np.arange(lanes), number - 1)
-        first = 0
-        for values in (parameters, state, draws):
-            rows[first : first + values.shape[1]] = values[fill].T
-            first += values.shape[1]
-        work = block[0]["w"]
-        work["density_change"], work["mix"] = (values[fill] for values in decode(actions))
-        work["first_cut_age"] = self.first_cut_age
-        work["products_decay"] = self.products_decay
-        forcing = np.zeros((0, 6, lanes)) if observed is None else np.repeat(observed[:, :, None], lanes, axis=2)
-        output = np.zeros((0 if daily is None else days, len(DAILY), lanes))
-        if self.backend == "numba":
-            kernel(lanes)(block[0], steps_per_day, days, forcing, output)
-        else:
-            with np.errstate(all="ignore"):
-                uncompiled(simulate_year)(_namespace(block[0]), steps_per_day, days, forcing, output)
-        if daily is not None:
-            daily[:] = output[:, :, :number].transpose(2, 0, 1)
-        first = parameters.shape[1]
-        new_state = rows[first : first + STATE_SIZE, :number].T
-        record = rows[first + STATE_SIZE + DRAWS_SIZE :][: len(RECORD), :number].T
-        return new_state, record
-
     def _check(self, stands, state, record, what) -> None:
-        """Raise `PhysicsError` where a year did not close, or left a number that is not finite."""
-        columns = [RECORD_NAMES.index(name) for name in TOLERANCES]
-        stocks = 1.0 + record[:, RECORD_NAMES.index("density_stems_ha")]
-        limits = np.array(list(TOLERANCES.values())) * np.ones((len(stands), 1))
-        limits[:, list(TOLERANCES).index("stems_residual_ha")] *= stocks
-        failed = ~(record[:, columns] <= limits)
-        infinite = ~np.isfinite(state).all(axis=1)
-        if not failed.any() and not infinite.any():
-            return
-        if failed.any():
-            k, column = np.argwhere(failed)[0]
-            problem = f"{list(TOLERANCES)[column]} = {record[k, columns[column]]:.3g} beyond {limits[k, column]:.1g}"
-        else:
-            k = int(np.argmax(infinite))
-            wrong = [name for name, value in zip(STATE_NAMES, state[k], strict=False) if not np.isfinite(value)]
-            problem = f"{', '.join(wrong) or 'stems'} not finite"
-        stand = stands[k]
-        terms = ", ".join(f"{name}={value:.6g}" for name, value in zip(RECORD_NAMES, record[k], strict=True))
-        site = ", ".join(f"{n}={v:.6g}" for n, v in zip(PARAMETER_NAMES, self.parameters[stand], strict=True))
-        raise PhysicsError(
-            f"{problem} in {what} {self.years[stand]} of stand {stand}, {self.seeds[stand]}; "
-            f"record: {terms}; site: {site}"
-        )
+        def describe(k):
+            return f"{what} {self.years[stands[k]]} of stand {stands[k]}, {self.seeds[stands[k]]}"
+
+        check_closure(state, record, self.parameters[stands], describe)
 
 
 #: Stocks that spin-up leaves as they were drawn.
@@ -301,44 +230,9 @@ HELD_IN_SPIN_UP = (
 )  # fmt: skip
 
 
-def blocks(number: int) -> list[slice]:
-    """Split stands into calls of the kernel: blocks of sixteen lanes; a few stands go one by one."""
-    if number < LANES // 2:
-        return [slice(k, k + 1) for k in range(number)]
-    return [slice(k, min(k + LANES, number)) for k in range(0, number, LANES)]
-
-
 def available_cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def draw_year(weather, disturbance) -> np.ndarray:
-    """A year's random numbers in the order of `sim.state.DRAWS`: always as many, whatever the stand does."""
-    weather_names = ("temperature_noise", "wet_dice", "wet_amount")
-    values = []
-    for name, (daily, distribution) in DRAWS.items():
-        generator = weather if name in weather_names else disturbance
-        size = DAYS if daily else 1
-        if distribution == "normal":
-            values.append(generator.standard_normal(size))
-        elif distribution == "exponential":
-            values.append(generator.standard_exponential(size))
-        else:
-            values.append(generator.random(size))
-    return np.concatenate(values)
-
-
-def first_cut_age(harvest_min_class: str, constants: dict) -> int:
-    """Youngest age that thinning may cut, from the name of its age class."""
-    ages = {
-        "young": SAPLING_LIMIT + 1,
-        "mature": int(constants["young_age_limit"]) + 1,
-        "old": int(constants["mature_age_limit"]) + 1,
-    }
-    if not isinstance(harvest_min_class, str) or harvest_min_class not in ages:
-        raise ValueError(f"harvest_min_class {harvest_min_class!r}: allowed are {', '.join(AGE_CLASSES[2:])}")
-    return ages[harvest_min_class]
 
 
 def yearly_decay(half_life_years) -> float:
@@ -351,58 +245,9 @@ def yearly_decay(half_life_years) -> float:
     return 1.0 - 0.5 ** (1.0 / half_life_years)
 
 
-def check_actions(actions, number) -> np.ndarray:
-    """Actions as integers, shape (number,). Raises ValueError naming the first that is not in [0, 25)."""
-    values = np.asarray(actions)
-    if values.shape != (number,):
-        raise ValueError(f"actions of shape {values.shape}: one integer for each of {number} stands is allowed")
-    if not np.issubdtype(values.dtype, np.integer):
-        raise ValueError(f"actions of type {values.dtype}: integers in [0, {NUM_ACTIONS}) are allowed")
-    wrong = values[(values < 0) | (values >= NUM_ACTIONS)]
-    if wrong.size:
-        raise ValueError(f"action {wrong[0]}: integers in [0, {NUM_ACTIONS}) are allowed")
-    return values
-
-
-def _draw_slice(wanted: str) -> slice:
-    first = 0
-    for name, (daily, _) in DRAWS.items():
-        size = DAYS if daily else 1
-        if name == wanted:
-            return slice(first, first + size)
-        first += size
-    raise KeyError(wanted)
-
-
-def _generator(state):
-    if state is None:
-        return None
-    generator = np.random.default_rng(0)
-    generator.bit_generator.state = state
-    return generator
-
-
-def _namespace(record):
-    """A block as plain attributes, for the interpreter."""
-    return SimpleNamespace(
-        **{group: SimpleNamespace(**{n: record[group][n] for n in record[group].dtype.names}) for group in "pswrd"}
-    )
-
-
 def _positive_integer(name, value) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 1:
         raise ValueError(f"{name}: a positive integer is allowed, got {value!r}")
     return int(value)
 
 
-@functools.cache
-def kernel(lanes: int):
-    """The year kernel for blocks of this many lanes, compiled at its first call or loaded from the disk cache."""
-    return specialised(simulate_year, f"{lanes}_lanes")
-
-
-def compile_kernels(number: int) -> None:
-    """Have the kernels ready that so many stands need, so that processes forked later find them."""
-    for lanes in sorted({LANES if b.stop - b.start > 1 else 1 for b in blocks(number)}):
-        block = np.zeros(1, block_dtype(lanes))[0]
-        kernel(lanes)(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes)))

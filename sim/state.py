@@ -137,7 +137,7 @@ FORCING = (
 #: What a step, a day or a year computes and hands on; nothing here lasts beyond the year.
 _WORK = """
 above_deep_node advected air air_density air_sum amplitude anomaly bare_gain below_deep_node biomass_before
-boundary_before boundary_conductance burnt_stems canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum
+boundary_before boundary_conductance canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum
 canopy_sw cos_latitude cos_peak cos_warmest cover_conifer cover_deciduous crown_area deep deep_base
 deep_by_surface deep_conductance deep_frozen deep_latent deep_sum deep_thawed deficit density_change diffuse
 dry_coefficient emissivity energy_before energy_gain et_before extraterrestrial first_cut_age fixed frozen_ratio
@@ -158,11 +158,18 @@ wind_below winter_air winter_days winter_down winter_up
 """.split()
 
 
+PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS)
+STATE_NAMES = tuple(STATE)
+RECORD_NAMES = tuple(RECORD)
+STATE_SIZE = len(STATE) + 2 * AGES
+DRAWS_SIZE = sum(DAYS if daily else 1 for daily, _ in DRAWS.values())
+
+
 @functools.cache
 def block_dtype(lanes: int) -> np.dtype:
     """dtype of a block of stands: records `p` (parameters), `s` (state), `d` (draws), `r` (record), `w` (work)."""
     lane, by_age, by_day = (lanes,), (AGES, lanes), (DAYS, lanes)
-    parameters = [(name, "f8", lane) for name in (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS)]
+    parameters = [(name, "f8", lane) for name in PARAMETER_NAMES]
     state = [(name, "f8", lane) for name in STATE]
     state += [("conifer_stems", "f8", by_age), ("deciduous_stems", "f8", by_age)]
     draws = [(name, "f8", by_day if daily else lane) for name, (daily, _) in DRAWS.items()]

@@ -8,7 +8,7 @@ from sim.account import clear_year, write_record
 from sim.canopy import VON_KARMAN, aerodynamic_conductance
 from sim.day import begin_day, end_day
 from sim.demography import OLDEST, count, grow_older, recruits, remove_share, self_thinning
-from sim.disturbance import between, outbreak_probability
+from sim.disturbance import between, insects
 from sim.jit import phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
 from sim.snow import LATENT_HEAT_FUSION
@@ -166,6 +166,7 @@ def grow_trunk(b, i):
 def end_year(b):
     """4 of the timeline: insects, mortality, recruitment, ageing, the organic layer, products, the account."""
     for i in range(len(b.s.swe)):
+        insects(b, i)
         renew_stems(b, i)
         decay(b, i)
         write_record(b, i)
@@ -173,28 +174,20 @@ def end_year(b):
 
 @phase
 def renew_stems(b, i):
-    """Insects, background mortality and self-thinning, recruitment, ageing."""
+    """Background mortality and self-thinning, recruitment, ageing."""
     s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
-    fire_killed = w.burnt_stems[i]
     conifers = count(s.conifer_stems, i, 0, OLDEST)
     deciduous = count(s.deciduous_stems, i, 0, OLDEST)
     density = conifers + deciduous
 
-    winter = w.winter_air[i] / w.winter_days[i] if w.winter_days[i] > 0.0 else 0.0
-    outbreak = p.insects[i] > 0.0 and d.insect_dice[i] < outbreak_probability(
-        p.insect_base_probability[i], winter, density, p.insect_lethal_c[i], p.insect_mild_c[i], p.insect_density[i]
-    )
-    insects = p.insect_mortality_rate[i] if outbreak else 0.0
     background = p.natural_mortality[i] * between(
         1.0 - p.mortality_spread[i], 1.0 + p.mortality_spread[i], d.mortality_dice[i]
     )
     crowding = self_thinning(
         density, p.max_natural_density[i], p.density_mortality_threshold[i], p.density_dependent_mortality[i]
     )
-    dies_conifer = min(insects + background * p.mortality_conifer[i] + crowding, 1.0)
-    dies_deciduous = min(
-        insects * p.insect_deciduous[i] + background * p.mortality_deciduous[i] + crowding, 1.0
-    )  # fmt: skip
+    dies_conifer = min(background * p.mortality_conifer[i] + crowding, 1.0)
+    dies_deciduous = min(background * p.mortality_deciduous[i] + crowding, 1.0)
     remove_share(s.conifer_stems, i, 0, OLDEST, dies_conifer)
     remove_share(s.deciduous_stems, i, 0, OLDEST, dies_deciduous)
     dead_conifer = dies_conifer * s.conifer_biomass[i]
@@ -203,14 +196,12 @@ def renew_stems(b, i):
     s.deciduous_biomass[i] -= dead_deciduous
     s.soil_carbon[i] += dead_conifer + dead_deciduous
     r.mortality_kgc_m2[i] += dead_conifer + dead_deciduous
-    killed = insects * (conifers + p.insect_deciduous[i] * deciduous)
-    r.insect_mortality[i] = killed / density if density > 0.0 else 0.0
 
     new = recruits(density, p.max_natural_density[i], p.recruitment_rate[i])
     seed_source = conifers / density if density > 0.0 else 0.5
     s.conifer_stems[0, i] += new * seed_source
     s.deciduous_stems[0, i] += new * (1.0 - seed_source)
-    w.stems_gain[i] += new - dies_conifer * conifers - dies_deciduous * deciduous - fire_killed
+    w.stems_gain[i] += new - dies_conifer * conifers - dies_deciduous * deciduous
     grow_older(s.conifer_stems, i)
     grow_older(s.deciduous_stems, i)
 

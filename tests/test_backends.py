@@ -8,7 +8,7 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 import sim
-from sim.stands import kernel
+from sim.block import kernel
 from sim.state import DAILY
 
 NUMBER = 19  # one block of sixteen lanes and a part of another

@@ -11,12 +11,11 @@ import pandas as pd
 import pytest
 
 import sim
-from sim import stands as stands_module
+from sim.closure import TOLERANCES
 from sim.demography import AGES
 from sim.snow import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.spin_up import INITIAL_LIMITS
-from sim.stands import STATE_NAMES
-from sim.state import DAILY
+from sim.state import DAILY, STATE_NAMES
 
 # Name -> (limits of the parameters, corners or even draws, time step in minutes, stands).
 CASES = {
@@ -319,9 +318,9 @@ def test_sites_that_were_hard(site, actions, seed, minutes):
     assert table.water_residual_mm.max() <= 1e-9
 
 
-@pytest.mark.parametrize("column", stands_module.TOLERANCES)
+@pytest.mark.parametrize("column", TOLERANCES)
 def test_a_year_that_does_not_close_raises_with_what_is_needed_to_replay_it(monkeypatch, column):
-    monkeypatch.setitem(stands_module.TOLERANCES, column, -1.0)
+    monkeypatch.setitem(TOLERANCES, column, -1.0)
     seeds = sim.episode_seeds(5)
     with pytest.raises(sim.PhysicsError) as failure:
         sim.simulate({"q10": 2.123}, 12, seed=5, years=1, time_step_minutes=240)

@@ -1,0 +1,86 @@
+"""A year of up to sixteen stands in one call of the kernel.
+
+Stands are rows of arrays, (stands, fields); a block has them as lanes of `sim.state.block_dtype`.
+"""
+import functools
+from types import SimpleNamespace
+
+import numpy as np
+
+from sim.jit import specialised, uncompiled
+from sim.management import decode
+from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype
+from sim.year import simulate_year
+
+LANES = 16
+BACKENDS = ("numba", "python")
+
+
+def blocks(number: int) -> list[slice]:
+    """Split stands into calls of the kernel: blocks of sixteen lanes; a few stands go one by one."""
+    if number < LANES // 2:
+        return [slice(k, k + 1) for k in range(number)]
+    return [slice(k, min(k + LANES, number)) for k in range(0, number, LANES)]
+
+
+def run_block(
+    parameters, state, draws, actions, observed, days, daily, *, steps_per_day, backend, first_cut_age, products_decay
+):
+    """Run a year; lanes that are left over repeat the last stand.
+
+    parameters, state, draws : (stands, fields); actions : (stands,); observed : forcing (days x steps a day, 6) for all
+    stands, or None; daily : filled with the daily output (stands, days, columns), or None. Returns the new state and
+    the annual record, (stands, fields) each, and touches nothing else.
+    """
+    number = len(parameters)
+    lanes = LANES if number > 1 else 1
+    block = np.zeros(1, block_dtype(lanes))
+    rows = block.view("f8").reshape(-1, lanes)
+    fill = np.minimum(np.arange(lanes), number - 1)
+    first = 0
+    for values in (parameters, state, draws):
+        rows[first : first + values.shape[1]] = values[fill].T
+        first += values.shape[1]
+    work = block[0]["w"]
+    work["density_change"], work["mix"] = (values[fill] for values in decode(actions))
+    work["first_cut_age"] = first_cut_age
+    work["products_decay"] = products_decay
+    forcing = np.zeros((0, 6, lanes)) if observed is None else np.repeat(observed[:, :, None], lanes, axis=2)
+    output = np.zeros((0 if daily is None else days, len(DAILY), lanes))
+    if backend == "numba":
+        kernel(lanes)(block[0], steps_per_day, days, forcing, output)
+    else:
+        with np.errstate(all="ignore"):
+            interpreted()(_namespace(block[0]), steps_per_day, days, forcing, output)
+    if daily is not None:
+        daily[:] = output[:, :, :number].transpose(2, 0, 1)
+    first = parameters.shape[1]
+    new_state = rows[first : first + STATE_SIZE, :number].T
+    record = rows[first + STATE_SIZE + DRAWS_SIZE :][: len(RECORD), :number].T
+    return new_state, record
+
+
+def _namespace(record):
+    """A block as plain attributes, for the interpreter."""
+    return SimpleNamespace(
+        **{group: SimpleNamespace(**{n: record[group][n] for n in record[group].dtype.names}) for group in "pswrd"}
+    )
+
+
+@functools.cache
+def kernel(lanes: int):
+    """The year kernel for blocks of this many lanes, compiled at its first call or loaded from the disk cache."""
+    return specialised(simulate_year, f"{lanes}_lanes")
+
+
+@functools.cache
+def interpreted():
+    """The same year as plain Python: the `python` backend."""
+    return uncompiled(simulate_year)
+
+
+def compile_kernels(number: int) -> None:
+    """Have the kernels ready that so many stands need, so that processes forked later find them."""
+    for lanes in sorted({LANES if b.stop - b.start > 1 else 1 for b in blocks(number)}):
+        block = np.zeros(1, block_dtype(lanes))[0]
+        kernel(lanes)(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes)))
