@@ -91,3 +91,9 @@ def insects(b, i):
     w.stems_gain[i] -= killed
     r.mortality_kgc_m2[i] += dead_conifer + dead_deciduous
     r.insect_mortality[i] = killed / density if density > 0.0 else 0.0
+
+
+@phase
+def disturb(b, i):
+    """The disturbances of a year's end, one after the other."""
+    insects(b, i)

@@ -8,7 +8,7 @@ from sim.account import clear_year, write_record
 from sim.canopy import VON_KARMAN, aerodynamic_conductance
 from sim.day import begin_day, end_day
 from sim.demography import OLDEST, count, grow_older, recruits, remove_share, self_thinning
-from sim.disturbance import between, insects
+from sim.disturbance import between, disturb
 from sim.jit import phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
 from sim.snow import LATENT_HEAT_FUSION
@@ -166,7 +166,7 @@ def grow_trunk(b, i):
 def end_year(b):
     """4 of the timeline: insects, mortality, recruitment, ageing, the organic layer, products, the account."""
     for i in range(len(b.s.swe)):
-        insects(b, i)
+        disturb(b, i)
         renew_stems(b, i)
         decay(b, i)
         write_record(b, i)
