@@ -12,7 +12,6 @@ from sim.snow import (
     snow_albedo,
     surface_albedo,
 )
-from sim.water import water_stress
 from sim.weather import FREEZING_POINT_K, PSYCHROMETRIC_PER_HPA, saturation_slope
 
 PSYCHROMETRIC_OVER_ICE = PSYCHROMETRIC_PER_HPA * LATENT_HEAT_VAPORISATION / LATENT_HEAT_SUBLIMATION
@@ -41,7 +40,7 @@ def sunlight(b, t, cos_hour, seconds, observed):
             w.shortwave[i], w.diffuse[i], beam_conifer, beam_deciduous, w.sky_conifer[i], w.sky_deciduous[i],
             p.albedo_conifer[i], p.albedo_deciduous[i], ground,
         )  # fmt: skip
-        stress = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds)
+        stress = w.water_stress[i]
         dry_conifer = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], p.vpd_high_conifer_hpa[i])
         dry_deciduous = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], p.vpd_high_deciduous_hpa[i])
         w.gpp_conifer[i] = photosynthesis(
@@ -95,8 +94,7 @@ def snowfall(b, seconds):
         caught = intercepted(w.snow[i], s.canopy_snow[i], capacity, w.snow_efficiency[i])
         store = s.canopy_snow[i] + caught
         ground_emission = black_body(s.ground[i] + FREEZING_POINT_K)
-        air_emission = black_body(w.air[i] + FREEZING_POINT_K)
-        net = w.canopy_sw[i] + w.longwave_cover[i] * (w.sky[i] + ground_emission - 2.0 * air_emission)
+        net = w.canopy_sw[i] + w.longwave_cover[i] * (w.sky[i] + ground_emission - 2.0 * w.air_emission[i])
         lost = snow_sublimation(
             store, capacity, p.sublimation_exposure[i], net, w.canopy_air[i], w.deficit[i],
             saturation_slope(w.air[i], w.saturation[i]), PSYCHROMETRIC_OVER_ICE * p.air_pressure_hpa[i],

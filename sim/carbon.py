@@ -19,11 +19,11 @@ def q10_factor(temperature, reference, log_q10) -> float:
 
 
 @compiled
-def maintenance(base, leaf_area, biomass, leaf_share, reference_leaf_area, reference_biomass) -> float:
-    """Maintenance respiration at the reference temperature [kgC m-2 s-1], by leaf area and by biomass, each
-    relative to the reference stand whose rate is `base` [kgC m-2 yr-1]."""
-    size = leaf_share * leaf_area / reference_leaf_area + (1.0 - leaf_share) * biomass / reference_biomass
-    return base * size / SECONDS_PER_YEAR
+def maintenance_rates(base, leaf_share, reference_leaf_area, reference_biomass) -> tuple[float, float]:
+    """Maintenance respiration at the reference temperature, per leaf area [kgC s-1] and per biomass [s-1], of which the
+    reference stand, whose rate is `base` [kgC m-2 yr-1], has `leaf_share` in its leaves."""
+    rate = base / SECONDS_PER_YEAR
+    return rate * leaf_share / reference_leaf_area, rate * (1.0 - leaf_share) / reference_biomass
 
 
 @compiled

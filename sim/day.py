@@ -73,7 +73,7 @@ def canopy_structure(b, day):
         w.trunk_canopy[i] = p.trunk_canopy_conductance[i] * crowns
         w.trunk_ground[i] = p.trunk_ground_conductance[i] * crowns
         w.snow_density[i] = bulk_density(crowns, p.snow_density_sheltered[i], p.snow_density_open[i])
-        w.snow_conductivity[i] = conductivity(w.snow_density[i])
+        w.snow_resistance[i] = 1.0 / (w.snow_density[i] * conductivity(w.snow_density[i]))
         w.temperature_stress_conifer[i] = stress_ramp(
             w.minimum_temperature[i], p.tmin_low_conifer[i], p.tmin_high_conifer[i]
         )
@@ -92,7 +92,7 @@ def wind_exchange(b, i, wind):
     w.wind_below[i] = wind * (1.0 - p.wind_reduction[i] * crowns)
     w.ground_velocity[i] = (w.snow_log[i] if b.s.swe[i] > SNOW_DAY_MM else w.ground_log[i]) * w.wind_below[i]
     exchange = w.air_density[i] * AIR_HEAT_CAPACITY * (w.canopy_log[i] * wind)
-    w.canopy_air[i] = exchange * max(w.longwave_cover[i], 1e-3)
+    w.canopy_air[i] = max(exchange, p.minimum_conductance[i]) * max(w.longwave_cover[i], 1e-3)
 
 
 @phase

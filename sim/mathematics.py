@@ -10,26 +10,19 @@ from sim.jit import compiled
 
 @compiled
 def exponential(x: float) -> float:
-    """e to the x, to a relative error of 3e-16 for x in [-700, 700]; beyond, the value at the limit.
+    """e to the x, to a relative error of 4e-16 for x in [-700, 700]; beyond, the value at the limit.
 
-    Cody and Waite's argument reduction (x = n ln 2 + r, |r| <= ln 2 / 2) and the Taylor series of degree 13.
+    Cody and Waite's argument reduction (x = n ln 2 + r, |r| <= ln 2 / 2) and the Taylor series of degree 12, in
+    Estrin's order: terms that do not wait for each other.
     """
     x = min(max(x, -700.0), 700.0)
     n = np.floor(x * 1.4426950408889634 + 0.5)
     r = (x - n * 0.693147180369123816490) - n * 1.90821492927058770002e-10
-    series = 1.0 / 6227020800.0
-    series = series * r + 1.0 / 479001600.0
-    series = series * r + 1.0 / 39916800.0
-    series = series * r + 1.0 / 3628800.0
-    series = series * r + 1.0 / 362880.0
-    series = series * r + 1.0 / 40320.0
-    series = series * r + 1.0 / 5040.0
-    series = series * r + 1.0 / 720.0
-    series = series * r + 1.0 / 120.0
-    series = series * r + 1.0 / 24.0
-    series = series * r + 1.0 / 6.0
-    series = series * r + 0.5
-    series = series * r + 1.0
-    series = series * r + 1.0
+    r2 = r * r
+    r4 = r2 * r2
+    first = (1.0 + r) + r2 * (0.5 + r * (1.0 / 6.0))
+    second = (1.0 / 24.0 + r * (1.0 / 120.0)) + r2 * (1.0 / 720.0 + r * (1.0 / 5040.0))
+    third = (1.0 / 40320.0 + r * (1.0 / 362880.0)) + r2 * (1.0 / 3628800.0 + r * (1.0 / 39916800.0))
+    series = first + r4 * (second + r4 * (third + r4 * (1.0 / 479001600.0)))
     power_of_two = np.int64((np.int64(n) + 1023) << 52).view(np.float64)
     return series * power_of_two

@@ -13,10 +13,9 @@ def temperature(enthalpy, thawed, frozen, latent, freezing_range) -> float:
     thawed, frozen : heat capacities [J m-2 K-1]; latent : heat of the node's freezing water [J m-2].
     """
     bottom = -(latent + frozen * freezing_range)
-    warm = enthalpy / thawed
-    slush = enthalpy / (latent / freezing_range + frozen)
-    cold = -freezing_range + (enthalpy - bottom) / frozen
-    return warm if enthalpy >= 0.0 else (slush if enthalpy > bottom else cold)
+    cold = enthalpy <= bottom
+    capacity = thawed if enthalpy >= 0.0 else (frozen if cold else latent / freezing_range + frozen)
+    return (enthalpy - (bottom if cold else 0.0)) / capacity - (freezing_range if cold else 0.0)
 
 
 @compiled
@@ -71,22 +70,22 @@ def respond_to_canopy(
     in the temperature of the node above it; what remains is the canopy's own equation.
     Returns the coefficients (deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base,
     trunk_by_canopy, trunk_by_ground, ground_base, ground_by_emission, ground_by_canopy) and the ground's stiffness
-    [W m-2 K-1].
+    [W m-2 K-1]; `yielding` is its inverse.
     """
-    whole = deep_inertia + surface_deep + deep_boundary
-    deep_base = (deep_inertia * deep + deep_boundary * boundary) / whole
-    deep_by_surface = surface_deep / whole
+    yielding = 1.0 / (deep_inertia + surface_deep + deep_boundary)
+    deep_base = (deep_inertia * deep + deep_boundary * boundary) * yielding
+    deep_by_surface = surface_deep * yielding
 
-    whole = surface_inertia + ground_surface + surface_deep * (1.0 - deep_by_surface)
-    surface_base = (surface_inertia * surface + surface_deep * deep_base) / whole
-    surface_by_ground = ground_surface / whole
+    yielding = 1.0 / (surface_inertia + ground_surface + surface_deep * (1.0 - deep_by_surface))
+    surface_base = (surface_inertia * surface + surface_deep * deep_base) * yielding
+    surface_by_ground = ground_surface * yielding
 
-    whole = trunk_inertia + trunk_canopy + trunk_air + trunk_ground
-    trunk_base = (trunk_inertia * trunk + trunk_air * air) / whole
-    trunk_by_canopy = trunk_canopy / whole
-    trunk_by_ground = trunk_ground / whole
+    yielding = 1.0 / (trunk_inertia + trunk_canopy + trunk_air + trunk_ground)
+    trunk_base = (trunk_inertia * trunk + trunk_air * air) * yielding
+    trunk_by_canopy = trunk_canopy * yielding
+    trunk_by_ground = trunk_ground * yielding
 
-    whole = (
+    stiffness = (
         ground_inertia
         + ground_emissivity * ground_emission_slope
         + ground_air
@@ -94,6 +93,7 @@ def respond_to_canopy(
         + trunk_ground * (1.0 - trunk_by_ground)
         + ground_surface * (1.0 - surface_by_ground)
     )
+    yielding = 1.0 / stiffness
     ground_base = (
         (ground_inertia + vapour_slope) * ground
         + ground_source
@@ -101,12 +101,12 @@ def respond_to_canopy(
         + ground_air * air
         + trunk_ground * trunk_base
         + ground_surface * surface_base
-    ) / whole
-    ground_by_emission = ground_emissivity * cover / whole
-    ground_by_canopy = trunk_ground * trunk_by_canopy / whole
+    ) * yielding
+    ground_by_emission = ground_emissivity * cover * yielding
+    ground_by_canopy = trunk_ground * trunk_by_canopy * yielding
     return (
         deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base, trunk_by_canopy, trunk_by_ground,
-        ground_base, ground_by_emission, ground_by_canopy, whole,
+        ground_base, ground_by_emission, ground_by_canopy, stiffness,
     )  # fmt: skip
 
 

@@ -11,7 +11,6 @@ from sim.snow import (
     stability,
 )
 from sim.soil import conductivity, frozen_share, heat_capacity, respond_to_canopy, temperature
-from sim.water import water_stress
 from sim.weather import (
     FREEZING_POINT_K,
     PSYCHROMETRIC_PER_HPA,
@@ -32,9 +31,9 @@ def conductances(b, seconds):
         dry = (1.0 - wet_share) * equilibrium * w.leaf_coefficient[i]
         wet = wet_share * equilibrium * p.priestley_taylor_wet[i]
         # Above 35 degC Priestley and Taylor's 1.26 would evaporate more than the net radiation.
-        all_of_it = max(dry + wet, 1.0)
-        w.dry_coefficient[i] = dry / all_of_it
-        w.wet_coefficient[i] = wet / all_of_it
+        scale = 1.0 / max(dry + wet, 1.0)
+        w.dry_coefficient[i] = dry * scale
+        w.wet_coefficient[i] = wet * scale
         w.wet_limit[i] = LATENT_HEAT_VAPORISATION * s.canopy_rain[i] / seconds
 
         velocity = w.ground_velocity[i] * stability(
@@ -53,10 +52,9 @@ def conductances(b, seconds):
         # so that the ground's equation and what is moved agree.
         drying = max(SATURATION_AT_FREEZING_HPA - w.humidity[i], 1e-3)
         transfer = min(w.vapour_density[i] * velocity, s.swe[i] / (seconds * drying))
-        stress = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds)
-        sky_and_canopy = longwave_down(w.sky[i], black_body(w.air[i] + FREEZING_POINT_K), w.longwave_cover[i])
+        sky_and_canopy = longwave_down(w.sky[i], w.air_emission[i], w.longwave_cover[i])
         available = w.ground_sw[i] + p.ground_emissivity[i] * (sky_and_canopy - emission)
-        moist = p.priestley_taylor_ground[i] * equilibrium * stress if w.air[i] > 0.0 else 0.0
+        moist = p.priestley_taylor_ground[i] * equilibrium * w.water_stress[i] if w.air[i] > 0.0 else 0.0
         w.ground_latent[i] = (
             LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.humidity[i]) if snow else moist * max(available, 0.0)
         )
@@ -82,7 +80,7 @@ def conductances(b, seconds):
         )
         w.upper_soil[i] = w.half_surface[i] / soil_surface
         w.surface_conductance[i] = 1.0 / (
-            s.swe[i] / (w.snow_density[i] * w.snow_conductivity[i])
+            s.swe[i] * w.snow_resistance[i]
             + s.organic_depth[i] * p.moss[i] / organic
             + w.upper_soil[i]
         )
@@ -120,7 +118,7 @@ def conductances(b, seconds):
         w.bare_gain[i] = stiffness / (stiffness - ICE_HEAT_CAPACITY * s.swe[i] / seconds - w.latent_slope[i])
         w.trial[i] = s.canopy[i]
         w.low[i] = w.air[i] - 100.0
-        w.high[i] = w.air[i] + 100.0
+        w.high[i] = w.air[i] + 300.0  # a few trees in calm air, and a low sun that shines on nothing else
 
 
 @phase

@@ -10,6 +10,7 @@ from sim.radiation import black_body
 from sim.snow import ICE_HEAT_CAPACITY, LATENT_HEAT_FUSION
 from sim.solve import conductances, solve_canopy
 from sim.transfer import move_carbon, move_energy_and_water
+from sim.water import water_stress
 from sim.weather import FREEZING_POINT_K, saturation_pressure, saturation_pressure_water, snow_share
 
 
@@ -24,7 +25,7 @@ def simulate_step(b, t, cos_hour, sin_hour, sun_up, seconds, observed):
         observed_air(b, observed[t])
     else:
         generated_air(b, cos_hour, sin_hour, seconds)
-    stores_before(b)
+    stores_before(b, seconds)
     if sun_up:
         sunlight(b, t, cos_hour, seconds, observed)
     else:
@@ -47,7 +48,8 @@ def generated_air(b, cos_hour, sin_hour, seconds):
     w = b.w
     for i in range(len(b.s.swe)):
         w.air[i] = w.mean_temperature[i] + w.amplitude[i] * (cos_hour * w.cos_peak[i] + sin_hour * w.sin_peak[i])
-        w.sky[i] = w.emissivity[i] * black_body(w.air[i] + FREEZING_POINT_K)
+        w.air_emission[i] = black_body(w.air[i] + FREEZING_POINT_K)
+        w.sky[i] = w.emissivity[i] * w.air_emission[i]
         w.precipitation_step[i] = w.precipitation[i] * (seconds / 86400.0)
 
 
@@ -58,14 +60,15 @@ def observed_air(b, row):
     for i in range(len(b.s.swe)):
         w.air[i] = row[0, i]
         w.vapour[i] = row[1, i] * saturation_pressure_water(row[0, i])
+        w.air_emission[i] = black_body(row[0, i] + FREEZING_POINT_K)
         w.sky[i] = row[4, i]
         w.precipitation_step[i] = row[5, i]
         wind_exchange(b, i, row[2, i])
 
 
 @phase
-def stores_before(b):
-    """Saturation, rain and snow of the step, and what is stored before it."""
+def stores_before(b, seconds):
+    """Saturation, rain and snow of the step, drought stress, and what is stored before it."""
     s, p, w = b.s, b.p, b.w
     for i in range(len(s.swe)):
         w.saturation[i] = saturation_pressure(w.air[i])
@@ -74,6 +77,9 @@ def stores_before(b):
         w.deficit[i] = w.saturation[i] - w.humidity[i]
         w.snow[i] = w.precipitation_step[i] * snow_share(w.air[i])
         w.rain[i] = w.precipitation_step[i] - w.snow[i]
+        w.water_stress[i] = water_stress(
+            s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds
+        )
         ice = s.swe[i] + s.canopy_snow[i]
         w.energy_before[i] = (
             s.trunk_capacity[i] * s.trunk[i]

@@ -30,7 +30,7 @@ def crown_areas(b, i):
             )  # fmt: skip
         deciduous += s.deciduous_stems[age, i] * factor
     old_conifer = s.conifer_stems[OLDEST, i] * p.crown_conifer_old[i]
-    old_deciduous = s.deciduous_stems[OLDEST, i] * p.crown_deciduous_old[i]
+    old_deciduous = s.deciduous_stems[OLDEST, i] * factor  # the last age's
     w.light_use_conifer[i] = p.light_use_conifer[i] * _decline(old_conifer, conifer, p.light_use_old[i])
     w.light_use_deciduous[i] = p.light_use_deciduous[i] * _decline(old_deciduous, deciduous, p.light_use_old[i])
 

@@ -3,7 +3,7 @@
 Enthalpies and stores follow from the fluxes, never the other way round; so a snowpack that melts out or soil that
 freezes within a step needs no correction.
 """
-from sim.carbon import SECONDS_PER_YEAR, autotrophic, maintenance, q10_factor
+from sim.carbon import autotrophic, q10_factor
 from sim.jit import phase
 from sim.radiation import black_body, black_body_slope, longwave_down, longwave_up
 from sim.snow import ICE_HEAT_CAPACITY, LATENT_HEAT_FUSION, LATENT_HEAT_SUBLIMATION, LATENT_HEAT_VAPORISATION
@@ -123,20 +123,12 @@ def move_carbon(b, seconds):
     for i in range(len(s.swe)):
         before = s.conifer_biomass[i] + s.deciduous_biomass[i] + s.soil_carbon[i]
         warmth = q10_factor(w.air[i], p.respiration_reference_c[i], w.log_q10[i])
-        conifer = warmth * maintenance(
-            p.base_respiration[i], w.lai_conifer[i], s.conifer_biomass[i],
-            p.maintenance_leaf_share[i], p.reference_lai[i], p.reference_biomass_kgc_m2[i],
-        )  # fmt: skip
-        deciduous = warmth * maintenance(
-            p.base_respiration[i], w.lai_deciduous[i], s.deciduous_biomass[i],
-            p.maintenance_leaf_share[i], p.reference_lai[i], p.reference_biomass_kgc_m2[i],
-        )  # fmt: skip
+        conifer = warmth * (w.leaf_rate[i] * w.lai_conifer[i] + w.wood_rate[i] * s.conifer_biomass[i])
+        deciduous = warmth * (w.leaf_rate[i] * w.lai_deciduous[i] + w.wood_rate[i] * s.deciduous_biomass[i])
         conifer = autotrophic(w.gpp_conifer[i], conifer, p.growth_respiration[i], s.conifer_biomass[i], seconds)
         deciduous = autotrophic(w.gpp_deciduous[i], deciduous, p.growth_respiration[i], s.deciduous_biomass[i], seconds)
-        soil = (
-            p.soil_respiration[i] * s.soil_carbon[i] / (p.reference_soil_carbon[i] * SECONDS_PER_YEAR) * seconds
-            * q10_factor(w.soil_top[i], p.respiration_reference_c[i], w.log_q10[i])
-        )  # fmt: skip
+        warmth = q10_factor(w.soil_top[i], p.respiration_reference_c[i], w.log_q10[i])
+        soil = warmth * w.soil_rate[i] * s.soil_carbon[i] * seconds
         s.conifer_biomass[i] += w.gpp_conifer[i] * seconds - conifer
         s.deciduous_biomass[i] += w.gpp_deciduous[i] * seconds - deciduous
         s.soil_carbon[i] -= soil

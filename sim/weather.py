@@ -20,7 +20,7 @@ LARGEST_RAIN_GROWTH = 1.0  # logarithm
 @compiled
 def saturation_pressure(temperature: float) -> float:
     """Saturation vapour pressure [hPa] over water above 0 degC, over ice below (Alduchov and Eskridge 1996)."""
-    over_ice = temperature < 0.0
+    over_ice = temperature <= 0.0
     scale = 6.1121 if over_ice else 6.1094
     a = 22.587 if over_ice else 17.625
     b = 273.86 if over_ice else 243.04
@@ -30,7 +30,7 @@ def saturation_pressure(temperature: float) -> float:
 @compiled
 def saturation_slope(temperature: float, saturation: float) -> float:
     """Derivative of `saturation_pressure` [hPa K-1], given its value."""
-    over_ice = temperature < 0.0
+    over_ice = temperature <= 0.0
     a = 22.587 if over_ice else 17.625
     b = 273.86 if over_ice else 243.04
     return saturation * a * b / ((temperature + b) * (temperature + b))

@@ -6,6 +6,7 @@ import math
 
 from sim.account import clear_year, write_record
 from sim.canopy import VON_KARMAN, aerodynamic_conductance
+from sim.carbon import SECONDS_PER_YEAR, maintenance_rates
 from sim.day import begin_day, end_day
 from sim.demography import OLDEST, count, grow_older, recruits, remove_share, self_thinning
 from sim.disturbance import between, disturb
@@ -136,6 +137,10 @@ def site_constants(b, i):
         1.0, p.canopy_roughness_m[i], p.canopy_reference_height_m[i], p.excess_resistance[i]
     )
     w.log_q10[i] = math.log(p.q10[i])
+    w.leaf_rate[i], w.wood_rate[i] = maintenance_rates(
+        p.base_respiration[i], p.maintenance_leaf_share[i], p.reference_lai[i], p.reference_biomass_kgc_m2[i]
+    )
+    w.soil_rate[i] = p.soil_respiration[i] / (p.reference_soil_carbon[i] * SECONDS_PER_YEAR)
 
     freezes = p.soil_freezing[i]
     surface = p.surface_soil_depth_m[i]

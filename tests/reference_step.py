@@ -55,14 +55,14 @@ def saturation_pressure_water(celsius):
 
 def saturation_pressure(celsius):
     """The same, over ice below 0 degC."""
-    if celsius < 0.0:
+    if celsius <= 0.0:
         return 6.1121 * math.exp(22.587 * celsius / (celsius + 273.86))
     return saturation_pressure_water(celsius)
 
 
 def saturation_slope(celsius):
     """Derivative of `saturation_pressure` [hPa K-1]."""
-    a, b = (22.587, 273.86) if celsius < 0.0 else (17.625, 243.04)
+    a, b = (22.587, 273.86) if celsius <= 0.0 else (17.625, 243.04)
     return saturation_pressure(celsius) * a * b / (celsius + b) ** 2
 
 
@@ -357,7 +357,7 @@ def canopy_exchange(p, air, today, cover):
     """h_c [W m-2 K-1]."""
     log = math.log(p.canopy_reference_height_m / p.canopy_roughness_m + 1.0)
     velocity = VON_KARMAN**2 * air.wind / (log * (log + p.excess_resistance))
-    return today.air_density * AIR_HEAT * max(cover, 1e-3) * velocity
+    return max(today.air_density * AIR_HEAT * velocity, p.minimum_conductance) * max(cover, 1e-3)
 
 
 def ground_exchange(p, s, air, today, ground):

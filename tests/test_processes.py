@@ -451,8 +451,9 @@ def test_q10():
 
 
 def test_maintenance_of_the_reference_stand_is_its_base_rate():
-    assert 365.0 * 86400.0 * carbon.maintenance(0.35, 4.0, 5.0, 0.9, 4.0, 5.0) == approx(0.35)
-    assert 365.0 * 86400.0 * carbon.maintenance(0.35, 0.0, 5.0, 0.9, 4.0, 5.0) == approx(0.035)
+    leaf, wood = carbon.maintenance_rates(0.35, 0.9, 4.0, 5.0)
+    assert 365.0 * 86400.0 * (4.0 * leaf + 5.0 * wood) == approx(0.35)
+    assert 365.0 * 86400.0 * 5.0 * wood == approx(0.035)
 
 
 def test_autotrophic_respiration_costs_growth_and_never_more_than_there_is():

@@ -114,8 +114,6 @@ def draw_state(generator, p, day):
     for species, present in zip(SPECIES, there, strict=True):
         ages = generator.random(AGES) < generator.uniform(0.02, 1.0)
         state[f"{species}_stems"] = present * ages * generator.exponential(15.0, AGES)
-    if not p.crown_development:  # see test_old_deciduous_trees_without_crown_development
-        state["deciduous_stems"][-1] = 0.0
     return state
 
 
@@ -135,7 +133,7 @@ def draw_generated(generator):
 
 
 def draw_observed(generator, p, steps_per_day, day):
-    """Forcing of a day, shape (steps, columns of `sim.state.FORCING`): hot and cold, calm nights, twilight."""
+    """Forcing of a day, shape (steps, columns of `sim.state.FORCING`): hot and cold, calm air, twilight."""
     sines = [sun(p, day, hour_angle(step, steps_per_day))[0] for step in range(steps_per_day)]
     light = np.array(sines) * generator.uniform(0.0, 1200.0, steps_per_day)
     light += generator.choice([0.0, 20.0], steps_per_day)
@@ -143,7 +141,7 @@ def draw_observed(generator, p, steps_per_day, day):
     rows[:, 0] = generator.normal(season_of(p, day), 10.0) + generator.normal(0.0, 4.0, steps_per_day)
     rows[:, 0] = np.clip(rows[:, 0], -75.0, 50.0)
     rows[:, 1] = generator.uniform(0.05, 1.1, steps_per_day)
-    rows[:, 2] = generator.uniform(0.3, 12.0, steps_per_day) * np.where(light > 0.0, 1.0, generator.choice([0.0, 1.0]))
+    rows[:, 2] = generator.uniform(0.3, 12.0, steps_per_day) * generator.choice([0.0, 1.0])
     rows[:, 3] = light
     rows[:, 4] = generator.uniform(100.0, 450.0, steps_per_day)
     rows[:, 5] = generator.exponential(20.0 / steps_per_day, steps_per_day) * generator.choice([0.0, 1.0])
@@ -319,9 +317,6 @@ def test_generated_weather_of_every_day(limits):
                 assert getattr(b.w, name)[0] == approx(getattr(expected, name), rel=1e-10)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the kernel gives old deciduous crowns their own factor, which the rest have not"
-)
 def test_old_deciduous_trees_without_crown_development():
     generator = np.random.default_rng(0)
     p = draw_parameters(generator, "sampled", "even")
