@@ -44,7 +44,10 @@ def draw_front(ax, front: pd.DataFrame, title: str):
     ax.axhline(0.0, color="#cccccc", lw=0.8, zorder=0)
     ax.axvline(0.0, color="#cccccc", lw=0.8, zorder=0)
     ax.plot(front[GAINS[0]], front[GAINS[1]], color="#888888", lw=0.8, zorder=1)
-    points = ax.scatter(front[GAINS[0]], front[GAINS[1]], c=front.conifer_share, cmap="viridis", vmin=0, vmax=1, s=16)
+    colors = matplotlib.colormaps["viridis"].with_extremes(bad="#bbbbbb")  # grey: nothing was planted
+    points = ax.scatter(
+        front[GAINS[0]], front[GAINS[1]], c=front.conifer_share, cmap=colors, vmin=0, vmax=1, s=16, plotnonfinite=True
+    )
     ax.set_title(title, fontsize=8)
     ax.tick_params(labelsize=7)
     return points
@@ -69,26 +72,38 @@ def draw_mechanisms(axes, summary: pd.DataFrame) -> None:
 
 
 def draw_variance(ax, components: pd.DataFrame) -> None:
-    """Shares of the variance: site, weather, policy and their interactions, stacked."""
+    """Shares of the variance, stacked: site, weather, policy, and what weather and policy do together.
+
+    Weather and policy with their interaction with the site. A third bar leaves the site out: what is left to a policy
+    that knows its site.
+    """
     groups = {
-        "site": ["site"], "weather": ["weather", "site x weather"], "policy": ["policy", "site x policy"],
-        "weather x policy": ["weather x policy", "site x weather x policy"],
-    }  # fmt: skip
-    labels = {"site": "site", "weather": "weather, on all sites and each", "policy": "policy, on all sites and each",
-              "weather x policy": "weather and policy"}  # fmt: skip
-    bars = [(name, value) for name in open_loop.OBJECTIVES for value in ("return", "one year")]
-    by_bar = components.set_index(["objective", "value", "component"]).share
-    left = np.zeros(len(bars))
-    for (group, parts), color in zip(groups.items(), ("#8c6d46", "#9dbfd9", "#2a7a3b", "#d0d0d0"), strict=True):
-        widths = np.array([sum(by_bar[(*bar, part)] for part in parts) for bar in bars])
-        ax.barh(range(len(bars)), widths, left=left, color=color, label=labels[group])
-        left += widths
-    ax.set_yticks(range(len(bars)), [f"{name}, {value}" for name, value in bars], fontsize=7)
+        "site": (["site"], "#8c6d46"),
+        "weather": (["weather", "site x weather"], "#9dbfd9"),
+        "policy": (["policy", "site x policy"], "#2a7a3b"),
+        "weather x policy": (["weather x policy", "site x weather x policy"], "#d0d0d0"),
+    }
+    by_component = components.set_index(["objective", "value", "component"]).share.sort_index()
+    bars = {}
+    for name in open_loop.OBJECTIVES:
+        for value in ("return", "one year"):
+            shares = {group: by_component[name, value][parts].sum() for group, (parts, _) in groups.items()}
+            bars[f"{name}, {value}"] = shares
+            if value == "return":
+                bars[f"{name}, return on a site"] = {
+                    group: share / (1.0 - shares["site"]) if group != "site" else 0.0 for group, share in shares.items()
+                }
+    table = pd.DataFrame(bars).T
+    left = np.zeros(len(table))
+    for group, (_, color) in groups.items():
+        ax.barh(range(len(table)), table[group], left=left, color=color, label=group)
+        left += table[group].to_numpy()
+    ax.set_yticks(range(len(table)), table.index, fontsize=7)
     ax.invert_yaxis()
     ax.set_xlim(0, 1)
     ax.set_title("share of the variance", fontsize=8)
     ax.tick_params(axis="x", labelsize=7)
-    ax.legend(fontsize=7, frameon=False, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.08))
+    ax.legend(fontsize=7, frameon=False, ncols=4, loc="upper center", bbox_to_anchor=(0.4, -0.08))
 
 
 def main(args: Args) -> None:
@@ -108,11 +123,12 @@ def main(args: Args) -> None:
     for ax, site in zip(axes.flat, sites.sort_values("boundary_above_air_k").itertuples(), strict=False):
         path = path_of(args.results / "fronts", site.site_seed, ALL_ON)
         front = plan_means(with_gains(read(path.parent, path.name)), "front")
-        title = f"boundary {site.boundary_above_air_k:+.1f} K, snow {site.snow_mm_day:.1f} mm/day"
+        title = f"boundary {site.boundary_above_air_k:.1f} K above air\nsnow {site.snow_mm_day:.1f} mm/day"
         points = draw_front(ax, front, title)
     upper.supxlabel("carbon gain over zero change", fontsize=9)
     upper.supylabel("thaw gain over zero change", fontsize=9)
-    bar = upper.colorbar(points, ax=axes, shrink=0.6, label="conifers among the stems planted")
+    bar = upper.colorbar(points, ax=axes, shrink=0.8)
+    bar.set_label("conifers among stems planted", fontsize=8)
     bar.ax.tick_params(labelsize=7)
     below = lower.subplots(1, 3, width_ratios=(1, 1, 1.6))
     draw_mechanisms(below[:2], mechanisms)

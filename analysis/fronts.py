@@ -1,7 +1,7 @@
 """How far the two objectives pull apart, site by site: fronts of non-dominated plans, found by NSGA-II.
 
     python analysis/fronts.py                        # 12 sites that span the ranges
-    python analysis/fronts.py --without-mechanisms   # 3 of them, each mechanism of the physics off in turn
+    python analysis/fronts.py --without-mechanisms   # 3 typical ones, each mechanism of the physics off in turn
 
 A plan is an action for every block of five years. It is sought on four weathers and reported on sixteen others, as
 returns and as gains: the return less that of zero change on the same weather. Needs `pip install -e ".[analysis]"`.
@@ -26,11 +26,11 @@ BLOCK_YEARS = 5
 FULL = Budget(population=40, generations=34, weathers=4, report_weathers=16)
 SMALL = Budget(population=24, generations=16, weathers=3, report_weathers=8)
 QUICK = Budget(population=16, generations=3, weathers=1, report_weathers=2)
-MECHANISM_SITES = 3
 ALL_ON = "all on"
 RETURNS = [f"{name}_return" for name in open_loop.OBJECTIVES]
 GAINS = [f"{name}_gain" for name in open_loop.OBJECTIVES]
-STAND = ["density_stems_ha", "conifer_fraction", "planted_stems_ha", "planted_conifers_ha", "thinned_stems_ha"]
+STAND = ["density_stems_ha", "conifer_fraction", "planted_stems_ha", "planted_conifers_ha", "thinned_stems_ha",
+         "clipped_thaw_years"]  # fmt: skip
 
 
 @dataclass
@@ -38,11 +38,11 @@ class Args:
     """Finds the non-dominated open-loop plans of sites that span the ranges, and what lies on their fronts."""
 
     sites: int | None = None
-    """how many sites (None: 12, or 3 without mechanisms)"""
+    """how many sites (None: 12, or 3 without mechanisms, which is the most)"""
     without_mechanisms: bool = False
     """on each site, all mechanisms on, then each off in turn, with a smaller search"""
     quick: bool = False
-    """a search that only shows that everything works, on 2 sites"""
+    """a search that only shows that everything works, on fewer sites"""
     seed: int = 1
     """of the search"""
     output_dir: Path | None = None
@@ -88,7 +88,7 @@ def study(site_seed: int, budget: Budget, seed: int, years: int, mechanisms=None
     table[RETURNS] = episodes.returns()
     values = (
         episodes.last("density_stems_ha"), episodes.last("conifer_fraction"), episodes.total("planted_stems_ha"),
-        episodes.planted_conifers(), episodes.total("thinned_stems_ha"),
+        episodes.planted_conifers(), episodes.total("thinned_stems_ha"), episodes.clipped_years()[:, 1],
     )  # fmt: skip
     table[STAND] = np.column_stack(values)
     return table
@@ -133,7 +133,8 @@ def summarise(table: pd.DataFrame) -> dict:
     apart = by_weather["carbon_end"] - by_weather["thaw_end"]
     errors = apart.std() / np.sqrt(len(apart))
     zero = (gains[RETURNS].to_numpy() - gains[GAINS].to_numpy()).mean(axis=0)
-    summary = {"zero_carbon": zero[0], "zero_thaw": zero[1], "points": len(front)}
+    summary = {"zero_carbon": zero[0], "zero_thaw": zero[1], "points": len(front),
+               "clipped_thaw_years": front.clipped_thaw_years.mean()}  # fmt: skip
     for name, gain in zip(open_loop.OBJECTIVES, GAINS, strict=True):
         summary[f"{name}_extent"] = abs(apart[gain].mean())
         summary[f"{name}_extent_error"] = errors[gain]
@@ -149,9 +150,10 @@ def summarise(table: pd.DataFrame) -> dict:
 
 def cases(args: Args) -> list[tuple[int, str]]:
     """Sites' seeds, and the mechanism that is off on them (or ALL_ON)."""
-    number = args.sites or (2 if args.quick else MECHANISM_SITES if args.without_mechanisms else 12)
-    switched = (ALL_ON, *sim.MECHANISMS) if args.without_mechanisms else (ALL_ON,)
-    return [(seed, mechanism) for seed in open_loop.spanning_sites(number) for mechanism in switched]
+    if args.without_mechanisms:
+        seeds = open_loop.quartile_sites()[: args.sites or (1 if args.quick else None)]
+        return [(seed, mechanism) for seed in seeds for mechanism in (ALL_ON, *sim.MECHANISMS)]
+    return [(seed, ALL_ON) for seed in open_loop.spanning_sites(args.sites or (2 if args.quick else 12))]
 
 
 def path_of(folder: Path, site_seed: int, mechanism: str) -> Path:
@@ -183,11 +185,12 @@ def most_episodes(budget: Budget) -> int:
 
 def main(args: Args) -> None:
     """Search every case that is not finished, write the summary, print it."""
-    if args.sites is not None and not 1 <= args.sites <= open_loop.CANDIDATES:
-        sys.exit(f"fronts.py: --sites {args.sites}: 1 to {open_loop.CANDIDATES} are allowed")
+    most = 3 if args.without_mechanisms else open_loop.CANDIDATES
+    if args.sites is not None and not 1 <= args.sites <= most:
+        sys.exit(f"fronts.py: --sites {args.sites}: 1 to {most} are allowed")
     budget = QUICK if args.quick else SMALL if args.without_mechanisms else FULL
     folder, todo = folder_of(args), cases(args)
-    settings = {"budget": budget._asdict(), "seed": args.seed, "years": YEARS, "block_years": BLOCK_YEARS,
+    settings = {"budget": budget._asdict(), "seed": args.seed, "years": YEARS, "block_years": BLOCK_YEARS, "columns": RETURNS + STAND,
                 "source": stored.source_hash()}  # fmt: skip
     finished = {case: stored.is_finished(path_of(folder, *case), settings | {"case": case}) for case in todo}
     print(f"{sum(finished.values())} of {len(todo)} fronts are there, in {folder}", flush=True)
@@ -218,14 +221,15 @@ def main(args: Args) -> None:
 
 def print_summary(summary: pd.DataFrame) -> None:
     """The summary, a line a front."""
-    print("\nsite        off               boundary  snow  zero change   extent +- error          timing"
-          "   gains and conifer share at the thaw end, the carbon end")  # fmt: skip
-    print("                              - air [K] [mm]  carbon  thaw  carbon      thaw           points")
+    print("\n                              boundary  snow    zero change    extent +- error                   clipped"
+          "   gains and conifer share at")  # fmt: skip
+    print("site        off             - air [K]  [mm]  carbon   thaw   carbon        thaw    points timing  years"
+          "   the thaw end        the carbon end")  # fmt: skip
     for row in summary.itertuples():
-        print(f"{row.site_seed}  {row.off:17s} {row.boundary_above_air_k:8.1f} {row.snow_mm_day:5.2f} "
+        print(f"{row.site_seed}  {row.off:17s} {row.boundary_above_air_k:7.1f} {row.snow_mm_day:5.2f} "
               f"{row.zero_carbon:+7.2f} {row.zero_thaw:+6.1f} "
               f"{row.carbon_extent:6.2f} +-{row.carbon_extent_error:4.2f} {row.thaw_extent:5.2f} "
-              f"+-{row.thaw_extent_error:4.2f} {row.points:3d} {row.timing_share:5.0%}   "
+              f"+-{row.thaw_extent_error:4.2f} {row.points:4d} {row.timing_share:6.0%} {row.clipped_thaw_years:6.1f}   "
               f"{row.thaw_end_carbon_gain:+5.2f} {row.thaw_end_thaw_gain:+6.2f} {row.thaw_end_conifer_share:4.0%}   "
               f"{row.carbon_end_carbon_gain:+5.2f} {row.carbon_end_thaw_gain:+6.2f} "
               f"{row.carbon_end_conifer_share:4.0%}")  # fmt: skip

@@ -34,6 +34,10 @@ class Episodes(NamedTuple):
         """Undiscounted sums of both rewards, (n, 2)."""
         return self.rewards.sum(axis=1)
 
+    def clipped_years(self) -> np.ndarray:
+        """Years in which each reward is at -1 or 1, where the policy no longer moves it, (n, 2)."""
+        return (np.abs(self.rewards) >= 1.0).sum(axis=1)
+
     def last(self, name: str) -> np.ndarray:
         """A column of the last year's record, (n,)."""
         return self.record[:, -1, _COLUMN[name]]
@@ -103,11 +107,23 @@ def spanning_sites(number: int) -> list[int]:
     """
     if not 1 <= number <= CANDIDATES:
         raise ValueError(f"number of sites {number}: 1 to {CANDIDATES} are allowed")
-    candidates = [FIRST_SITE_SEED + k for k in range(CANDIDATES)]
-    features = np.array([list(site_features(sim.sample_site(seed)).values()) for seed in candidates])
-    ranks = features.argsort(axis=0).argsort(axis=0) / (CANDIDATES - 1)
+    ranks = _feature_ranks()
     chosen = [int(((ranks - 0.5) ** 2).sum(axis=1).argmin())]
     while len(chosen) < number:
         gaps = ((ranks[:, None] - ranks[chosen]) ** 2).sum(axis=2).min(axis=1)
         chosen.append(int(gaps.argmax()))
-    return [candidates[k] for k in chosen]
+    return [FIRST_SITE_SEED + k for k in chosen]
+
+
+def quartile_sites() -> list[int]:
+    """Seeds of three sites: the median, lower and upper quartile of boundary minus air temperature, else typical."""
+    ranks = _feature_ranks()
+    wanted = [(quantile, 0.5, 0.5) for quantile in (0.5, 0.25, 0.75)]
+    return [FIRST_SITE_SEED + int(((ranks - point) ** 2).sum(axis=1).argmin()) for point in wanted]
+
+
+def _feature_ranks() -> np.ndarray:
+    """Ranks of the candidates' features, scaled to [0, 1], (CANDIDATES, 3)."""
+    sites = [sim.sample_site(FIRST_SITE_SEED + k) for k in range(CANDIDATES)]
+    features = np.array([list(site_features(site).values()) for site in sites])
+    return features.argsort(axis=0).argsort(axis=0) / (CANDIDATES - 1)

@@ -118,7 +118,7 @@ def test_a_finished_front_is_not_searched_again(tmp_path, monkeypatch, capsys):
 
 
 def test_refusals(capsys):
-    with pytest.raises(SystemExit, match="--sites 0: 1 to 400"):
+    with pytest.raises(SystemExit, match="--sites 0: 1 to 400 are"):
         run_script("analysis/fronts.py", "--sites", 0)
 
 

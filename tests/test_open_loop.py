@@ -32,6 +32,12 @@ def test_planted_conifers_follow_the_mix():
     assert episodes.planted_conifers().tolist() == [200, 75, 0]
 
 
+def test_years_at_the_rewards_bounds_are_counted():
+    rewards = np.array([[[0, -1], [1, 0.5], [0.2, -1]], [[0, 0], [0, 0], [0, 1]]])
+    episodes = open_loop.Episodes(rewards, actions=None, record=None, start={})
+    assert episodes.clipped_years().tolist() == [[1, 2], [0, 1]]
+
+
 def test_a_site_keeps_its_start_and_a_weather_its_dice():
     first, second = open_loop.seeds(1, 0), open_loop.seeds(1, 1)
     elsewhere = open_loop.seeds(2, 0)
@@ -53,3 +59,12 @@ def test_sites_span_the_ranges():
         assert chosen.min() < low and chosen.max() > high
     with pytest.raises(ValueError, match="0: 1 to 400"):
         open_loop.spanning_sites(0)
+
+
+def test_quartile_sites():
+    def boundary_above_air(site_seed):
+        return open_loop.site_features(sim.sample_site(site_seed))["boundary_above_air_k"]
+
+    sampled = [boundary_above_air(open_loop.FIRST_SITE_SEED + k) for k in range(open_loop.CANDIDATES)]
+    chosen = [boundary_above_air(site) for site in open_loop.quartile_sites()]
+    assert chosen == pytest.approx(np.percentile(sampled, [50, 25, 75]), abs=0.3)
