@@ -153,6 +153,14 @@ def action_masks(observations: np.ndarray, harvest_min_class: str = "young") -> 
     density = observations[:, 2] * 1500.0
     fractions = observations[:, _AGE].reshape(-1, 2, len(AGE_CLASSES))
     harvestable = density * fractions[:, :, AGE_CLASSES.index(harvest_min_class) :].sum(axis=(1, 2))
+    return valid_actions(density, harvestable)
+
+
+def valid_actions(density: np.ndarray, harvestable: np.ndarray) -> np.ndarray:
+    """Actions whose whole density change can be made, bool, shape (n, 25).
+
+    density, harvestable : stems, and those of an age that may be cut [stems ha-1], shape (n,).
+    """
     changes = np.array(DENSITY_CHANGES)
     small = 0.5 * NEGLIGIBLE_STEMS
     planting = density[:, None] + changes < LARGEST_DENSITY - small
@@ -249,15 +257,37 @@ def thaw_reward(cooling: np.ndarray, warming: np.ndarray, reward: Reward, formul
     return (cooling - weight * warming) / reward.thaw_scale
 
 
-# ---------------------------------------------------------------------------------------------------------------
-# Episodes: what one environment and many in lockstep share
-# ---------------------------------------------------------------------------------------------------------------
-
 #: Columns that the environment adds to the annual record.
 REWARD_COLUMNS = (
     "carbon_change", "stock_bonus", "product_bonus", "biomass_limit_penalty", "soil_limit_penalty", "density_penalty",
     "ineffective_penalty", "carbon_clipped", "thaw_clipped", "carbon_reward", "thaw_reward",
 )  # fmt: skip
+
+
+def rewards_of_year(record: np.ndarray, actions: np.ndarray, reward: Reward, formulation: str) -> dict[str, np.ndarray]:
+    """Both rewards of a year and the parts they are made of: `REWARD_COLUMNS`, each shape (n,).
+
+    record : annual records (n, columns of `sim.RECORD_NAMES`); actions : what was asked for, integers (n,);
+    formulation : of the thaw reward, one of `THAW_FORMULATIONS`.
+    """
+    components = reward_components(record, np.take(DENSITY_CHANGES, actions // 5), reward)
+    carbon = carbon_reward(components)
+    cooling, warming = (record[:, _COLUMN[f"boundary_{way}_mj_m2"]] for way in ("cooling", "warming"))
+    thaw = thaw_reward(cooling, warming, reward, formulation)
+    rewarded = np.clip(np.stack([carbon, thaw], axis=1), -1.0, 1.0)
+    return {
+        **components,
+        "carbon_clipped": carbon - rewarded[:, 0],
+        "thaw_clipped": thaw - rewarded[:, 1],
+        "carbon_reward": rewarded[:, 0],
+        "thaw_reward": rewarded[:, 1],
+    }
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# Episodes: what one environment and many in lockstep share
+# ---------------------------------------------------------------------------------------------------------------
+
 HISTORY_NAMES = (*sim.RECORD_NAMES, *REWARD_COLUMNS)
 _HISTORY = {name: i for i, name in enumerate(HISTORY_NAMES)}
 
@@ -349,25 +379,13 @@ class _Episodes:
         actions = check_actions(actions, self.number)
         before = self.conifer_fraction()
         record = self.stands.step(actions)
-        change = np.take(DENSITY_CHANGES, actions // 5)
-        components = reward_components(record, change, self.reward)
-        carbon = carbon_reward(components)
-        cooling, warming = (record[:, _COLUMN[f"boundary_{way}_mj_m2"]] for way in ("cooling", "warming"))
-        thaw = thaw_reward(cooling, warming, self.reward, self.thaw_formulation)
-        rewards = np.clip(np.stack([carbon, thaw], axis=1), -1.0, 1.0)
-        parts = {
-            **components,
-            "carbon_clipped": carbon - rewards[:, 0],
-            "thaw_clipped": thaw - rewards[:, 1],
-            "carbon_reward": rewards[:, 0],
-            "thaw_reward": rewards[:, 1],
-        }
+        parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
         year = self.year
         self.history[np.arange(self.number), year] = np.column_stack([record, *(parts[n] for n in REWARD_COLUMNS)])
         self.year = year + 1
         self.running = self.year < self.years
-        self._observe_year(record, actions, before, components)
-        return rewards.astype(np.float32)
+        self._observe_year(record, actions, before, parts)
+        return np.stack([parts["carbon_reward"], parts["thaw_reward"]], axis=1).astype(np.float32)
 
     def observations(self) -> np.ndarray:
         """Fresh float32 observations, shape (number, entries)."""

@@ -1,0 +1,40 @@
+"""Tables on disk that know what made them, so that a study that was stopped goes on where it stopped."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import pandas as pd
+
+from analysis.protocol import FLOAT_FORMAT, replacing
+
+ROOT = Path(__file__).parents[1]
+
+
+def source_hash() -> str:
+    """Hash of all that an episode's numbers depend on: the simulator, its tables, the reward."""
+    digest = hashlib.sha256()
+    for path in [*sorted(ROOT.glob("sim/*.py")), *sorted(ROOT.glob("sim/*.csv")), ROOT / "boreal_env.py"]:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def write(path: Path, table: pd.DataFrame, settings: dict) -> None:
+    """Write a table as CSV, whole or not at all; its first line is a comment with the settings that made it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as file:
+        file.write(f"# {json.dumps(settings)}\n".encode())
+        table.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+
+
+def read(path: Path) -> pd.DataFrame:
+    """A table that `write` wrote."""
+    return pd.read_csv(path, skiprows=1)
+
+
+def is_finished(path: Path, settings: dict) -> bool:
+    """Whether the table is there and was made with these settings."""
+    if not path.exists():
+        return False
+    with path.open(encoding="utf-8") as file:
+        return file.readline() == f"# {json.dumps(settings)}\n"

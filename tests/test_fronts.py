@@ -1,0 +1,151 @@
+import numpy as np
+import pandas as pd
+import pytest
+from scripts import run_script
+
+from analysis import draw_conflict, fronts, nsga2, open_loop, stored
+
+TINY = nsga2.Budget(population=8, generations=2, weathers=1, report_weathers=2)
+
+
+def table_of(plans: dict, kind: str) -> pd.DataFrame:
+    """Two weathers of plans given as actions -> (carbon, thaw, conifers planted of 100)."""
+    rows = [
+        {
+            "kind": kind,
+            "actions": actions,
+            "weather": weather,
+            "carbon_return": carbon + weather,
+            "thaw_return": thaw - weather,
+            **dict.fromkeys(fronts.STAND, 100.0),
+            "planted_conifers_ha": conifers,
+        }
+        for actions, (carbon, thaw, conifers) in plans.items()
+        for weather in (4, 5)
+    ]
+    return pd.DataFrame(rows)
+
+
+FOUND = {"24 24": (1, 4, 100), "20 20": (3, 1, 0), "24 20": (2, 3, 50), "20 24": (1, 3, 50)}
+CONSTANT = {"12 12": (0, 0, 0), "22 22": (2, 2, 50), "2 2": (-1, -1, 0)}
+
+
+def hand_case() -> pd.DataFrame:
+    return pd.concat([table_of(FOUND, "front"), table_of(CONSTANT, "constant")], ignore_index=True)
+
+
+def test_genes_are_blocks_of_actions():
+    assert nsga2.plans([[4, 0, 2, 2]], block_years=3, years=5).tolist() == [[20, 20, 20, 12, 12]]
+    constant = nsga2.plans(nsga2.constant_genes(3), 1, 3)
+    assert (constant == constant[:, :1]).all()
+    assert sorted(constant[:, 0]) == sorted({*range(10), 12, *range(15, 25)})
+
+
+def test_search_finds_a_known_front():
+    """Blocks of conifers against blocks of deciduous trees planted: only full planting is not dominated."""
+
+    def objectives(genes):
+        pairs = genes.reshape(len(genes), -1, 2)
+        planting = pairs[:, :, 0] == 4
+        return np.column_stack([(planting & (pairs[:, :, 1] == mix)).sum(axis=1) for mix in (4, 0)])
+
+    budget = nsga2.Budget(population=24, generations=30, weathers=1, report_weathers=1)
+    found = objectives(nsga2.search(objectives, 4, budget, seed=1))
+    assert {tuple(point) for point in found} == {(k, 4 - k) for k in range(5)}
+
+
+def test_equal_plans_have_equal_genes():
+    seen = []
+
+    def objectives(genes):
+        seen.append(list(map(tuple, genes)))
+        return np.column_stack([genes.sum(axis=1), -genes[:, 0]])
+
+    nsga2.search(objectives, 2, nsga2.Budget(8, 5, 1, 1), seed=1)
+    assert all(len(set(generation)) == len(generation) for generation in seen)
+    assert all(gene[k + 1] == nsga2.HALF for gene in sum(seen, []) for k in (0, 2) if gene[k] == nsga2.NO_CHANGE)
+
+
+def test_front_gains_and_ends_of_a_hand_case():
+    gains = fronts.with_gains(hand_case())
+    assert (gains[gains.actions == "12 12"][fronts.GAINS] == 0).all(axis=None)
+    front = fronts.plan_means(gains, "front")
+    assert front.index.tolist() == ["24 24", "24 20", "20 20"]
+    assert front.conifer_share.tolist() == [1, 0.5, 0]
+    summary = fronts.summarise(hand_case())
+    assert (summary["carbon_extent"], summary["thaw_extent"], summary["points"]) == (2, 3, 3)
+    assert (summary["thaw_end_carbon_gain"], summary["carbon_end_thaw_gain"]) == (1, 1)
+    assert (summary["zero_carbon"], summary["zero_thaw"]) == (4.5, -4.5)
+
+
+def test_timing_share():
+    front, constant = np.array([(1, 4), (2, 3), (3, 1)]), np.array([(2, 2)])
+    # from zero change: 4 + 3 + 1 = 8 by the front, 4 by the constant plan
+    assert fronts.timing_share(front, constant) == pytest.approx(0.5)
+    # from (0, -1): another row of 3 for the front and of 2 for the constant plans
+    assert fronts.timing_share(front, np.array([(2, 2), (0, -1)])) == pytest.approx(1 - 6 / 11)
+
+
+def test_a_tiny_front_can_be_repeated_and_is_reported_on_other_weathers():
+    site = open_loop.FIRST_SITE_SEED
+    table = fronts.study(site, TINY, seed=1, years=6)
+    pd.testing.assert_frame_equal(table, fronts.study(site, TINY, seed=1, years=6))
+    assert set(table.weather) == {1, 2}
+    assert (table.actions.str.split().str.len() == 2).all()
+
+
+def test_mechanisms_are_switched_off():
+    budget = TINY._replace(generations=1, report_weathers=1)
+    on, off = (
+        fronts.study(open_loop.FIRST_SITE_SEED, budget, seed=1, years=1, mechanisms=switches)
+        for switches in (None, {"moss": False})
+    )
+    on, off = (of[of.kind == "constant"].thaw_return.to_numpy() for of in (on, off))
+    assert (on != off).all()
+
+
+def test_a_finished_front_is_not_searched_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(fronts, "QUICK", TINY)
+    monkeypatch.setattr(fronts, "YEARS", 6)
+    fronts.main(fronts.Args(quick=True, sites=1, output_dir=tmp_path))
+    before = stored.read(tmp_path / "summary.csv")
+    monkeypatch.setattr(fronts, "study", None)
+    fronts.main(fronts.Args(quick=True, sites=1, output_dir=tmp_path))
+    assert "1 of 1 fronts are there" in capsys.readouterr().out
+    pd.testing.assert_frame_equal(stored.read(tmp_path / "summary.csv"), before)
+    with pytest.raises(TypeError):  # another search's seed: the stored front is not taken for it
+        fronts.main(fronts.Args(quick=True, sites=1, output_dir=tmp_path, seed=2))
+
+
+def test_refusals(capsys):
+    with pytest.raises(SystemExit, match="--sites 0: 1 to 400 are"):
+        run_script("analysis/fronts.py", "--sites", 0)
+
+
+def test_figure(tmp_path):
+    args = draw_conflict.Args(results=tmp_path, path=tmp_path / "conflict.png")
+    with pytest.raises(SystemExit, match="python analysis/fronts.py makes it"):
+        draw_conflict.main(args)
+    summary = pd.DataFrame([
+        {"site_seed": 7, "off": off, "boundary_above_air_k": 3, "snow_mm_day": 1, **fronts.summarise(hand_case())}
+        for off in (fronts.ALL_ON, "moss")
+    ])  # fmt: skip
+    stored.write(tmp_path / "fronts/summary.csv", summary[:1], {})
+    stored.write(fronts.path_of(tmp_path / "fronts", 7, fronts.ALL_ON), hand_case(), {})
+    with pytest.raises(SystemExit, match="fronts.py --without-mechanisms makes it"):
+        draw_conflict.main(args)
+    stored.write(tmp_path / "fronts/mechanisms/summary.csv", summary, {})
+    parts = ("site", "weather", "policy", "site x weather", "site x policy", "weather x policy",
+             "site x weather x policy")  # fmt: skip
+    components = [
+        {"objective": objective, "value": value, "component": part, "share": 1 / 7}
+        for objective in open_loop.OBJECTIVES
+        for value in ("return", "one year")
+        for part in parts
+    ]
+    stored.write(tmp_path / "variance/components.csv", pd.DataFrame(components), {})
+    draw_conflict.main(args)
+    first = args.path.read_bytes()
+    assert first.startswith(b"\x89PNG")
+    draw_conflict.main(args)
+    assert args.path.read_bytes() == first

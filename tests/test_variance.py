@@ -1,0 +1,72 @@
+import numpy as np
+import pandas as pd
+import pytest
+from scripts import run_script
+
+import sim
+from analysis import open_loop, stored, variance
+
+SITE = open_loop.FIRST_SITE_SEED + 2
+
+
+def test_additive_table_has_no_interactions():
+    site, weather, policy = np.array([1.0, 4, 7, 20]), np.array([0.0, 2, 1]), np.array([-3.0, 3])
+    values = site[:, None, None] + weather[:, None] + policy
+    components = variance.variance_components(values)
+    for name, effect in (("site", site), ("weather", weather), ("policy", policy)):
+        assert components[name] == pytest.approx(effect.var(ddof=1))
+    assert components[[name for name in components.index if " x " in name]].abs().max() < 1e-12
+
+
+def test_components_of_a_synthetic_table():
+    true = {"site": 9.0, "weather": 1.0, "policy": 4.0, "site x weather": 0.5, "site x policy": 2.0,
+            "weather x policy": 0.25, "site x weather x policy": 1.0}  # fmt: skip
+    sizes = dict(zip(variance.FACTORS, (12, 10, 11), strict=True))
+    generator = np.random.default_rng(0)
+    estimates = []
+    for _ in range(400):
+        values = np.zeros(tuple(sizes.values()))
+        for name, component in true.items():
+            shape = [size if factor in name.split(" x ") else 1 for factor, size in sizes.items()]
+            values = values + component**0.5 * generator.standard_normal(shape)
+        estimates.append(variance.variance_components(values))
+    estimates = pd.DataFrame(estimates)
+    error = (estimates.mean() - pd.Series(true)) / (estimates.std() / 20)
+    assert error.abs().max() < 4
+
+
+def test_a_small_component_may_be_estimated_below_zero():
+    # the sites' means are equal, which weathers alone would make unlikely
+    components = variance.variance_components(np.array([[1.0, -1.0], [-1.0, 1.0]]), ("site", "weather"))
+    assert components["site"] == pytest.approx(-2) and components["site x weather"] == pytest.approx(4)
+
+
+def test_what_explains_the_sites():
+    generator = np.random.default_rng(1)
+    features = pd.DataFrame(generator.standard_normal((400, 2)), columns=["boundary_above_air_k", "snow_mm_day"])
+    boundary, snow = features.to_numpy().T
+    exact = variance.site_effect(3 * boundary - snow + 5, features)
+    assert exact["both"] == pytest.approx(1) and exact["rest"] == pytest.approx(0)
+    assert exact["boundary minus air"] == pytest.approx(0.9, abs=0.03)
+    nothing = variance.site_effect(generator.standard_normal(400), features)
+    assert nothing["rest"] == pytest.approx(1, abs=0.03)
+
+
+def test_a_tiny_design(tmp_path, monkeypatch):
+    monkeypatch.setattr(variance, "YEARS", 2)
+    variance.main(variance.Args(quick=True, output_dir=tmp_path))
+    components = stored.read(tmp_path / "components.csv")
+    assert components.groupby(["objective", "value"]).share.sum().to_numpy() == pytest.approx(np.ones(4))
+    episodes = stored.read(tmp_path / "episodes.csv")
+    assert len(episodes) == 4 * 2 * len(variance.POLICIES)
+    unchanged = episodes[episodes.policy == "zero change"]
+    assert (unchanged[["carbon_gain", "thaw_gain"]] == 0).all(axis=None)
+    # a row in the middle carries the right labels
+    row = episodes[(episodes.site == SITE) & (episodes.weather == 1) & (episodes.policy == "-50 half")].iloc[0]
+    played = open_loop.play([sim.sample_site(SITE)], [open_loop.seeds(SITE, 1)], [[7, 7]]).returns()[0]
+    assert row[["carbon_return", "thaw_return"]].tolist() == pytest.approx(played, rel=1e-8)
+
+
+def test_refusals():
+    with pytest.raises(SystemExit, match="--sites >= 4"):
+        run_script("analysis/variance.py", "--sites", 1)
