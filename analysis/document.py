@@ -1,6 +1,7 @@
 """Pieces of a generated document: tables, figures with fixed bytes, and what misses."""
 
 import io
+import textwrap
 from dataclasses import dataclass, field
 
 import matplotlib.style
@@ -12,6 +13,7 @@ from PIL import Image
 BLACK, GREY = "#222222", "#9a9a9a"
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9"
 DPI, COLOURS = 100, 128
+WIDTH = 120
 STYLE = {"font.size": 9, "axes.titlesize": 9, "axes.titlelocation": "left", "legend.fontsize": 8,
          "legend.frameon": False, "axes.spines.top": False, "axes.spines.right": False}  # fmt: skip
 
@@ -51,6 +53,17 @@ def number(value: float, digits: int = 2, sign: bool = False) -> str:
 def percent(share: float) -> str:
     """A share in per cent."""
     return f"{100.0 * share:.0f} %"
+
+
+def fill(text: str) -> str:
+    """Markdown with its paragraphs filled to WIDTH; tables, headings and images stay as they are."""
+    blocks = text.split("\n\n")
+    return "\n\n".join(block if block.startswith(("|", "#", "!")) else _fill(block) for block in blocks)
+
+
+def _fill(paragraph: str) -> str:
+    words = " ".join(paragraph.split())
+    return textwrap.fill(words, WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 #: Decorator of functions that draw: they do so in the document's style.

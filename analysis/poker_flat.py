@@ -44,6 +44,7 @@ SPRING = towers.Tower(
 FLUXES = {
     "gpp_gc_m2": ("GPP_DT_VUT_REF", 1.0, "NEE_VUT_REF_QC"),
     "respiration_gc_m2": ("RECO_DT_VUT_REF", 1.0, "NEE_VUT_REF_QC"),
+    "exchange_gc_m2": ("NEE_VUT_REF", 1.0, "NEE_VUT_REF_QC"),
     "latent_heat_w_m2": ("LE_F_MDS", 1.0, "LE_F_MDS_QC"),
     "sensible_heat_w_m2": ("H_F_MDS", 1.0, "H_F_MDS_QC"),
     "ground_heat_w_m2": ("G_F_MDS", 1.0, None),

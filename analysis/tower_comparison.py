@@ -27,8 +27,8 @@ DAYS_OF_SNOW_OFF = 7.0
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is compared: unit, column measured, columns modelled and their factor, and the bias that counts as a miss,
-    in the unit or as a share of the measured months' mean magnitude."""
+    """What is compared: unit, column measured, columns modelled (their sum, less those of `less`) and their factor, and
+    the bias that counts as a miss, in the unit or as a share of the measured months' mean magnitude."""
 
     unit: str
     measured: str
@@ -37,13 +37,17 @@ class Quantity:
     tolerance: float = 0.2
     relative: bool = True
     digits: int = 1
+    less: tuple[str, ...] = ()
 
 
+RESPIRATION = ("autotrophic_respiration_kgc_m2", "heterotrophic_respiration_kgc_m2")
 QUANTITIES = {
     "GPP": Quantity("gC m-2 day-1", "gpp_gc_m2", ("gpp_kgc_m2",), 1000.0, digits=2),
     "ecosystem respiration": Quantity(
-        "gC m-2 day-1", "respiration_gc_m2", ("autotrophic_respiration_kgc_m2", "heterotrophic_respiration_kgc_m2"),
-        1000.0, digits=2,
+        "gC m-2 day-1", "respiration_gc_m2", RESPIRATION, 1000.0, digits=2
+    ),
+    "net exchange": Quantity(
+        "gC m-2 day-1", "exchange_gc_m2", RESPIRATION, 1000.0, digits=2, less=("gpp_kgc_m2",)
     ),
     "latent heat": Quantity("W m-2", "latent_heat_w_m2", ("latent_heat_mj_m2",), 1.0 / MJ_PER_DAY),
     "sensible heat": Quantity("W m-2", "sensible_heat_w_m2", ("sensible_heat_mj_m2",), 1.0 / MJ_PER_DAY),
@@ -70,9 +74,9 @@ def pair(fluxes: pd.DataFrame, modelled: pd.DataFrame) -> dict[str, pd.DataFrame
     """Per quantity a row a day: `measured`, `modelled`, and whether the day `counts`."""
     days = {}
     for name, q in QUANTITIES.items():
-        values = q.factor * modelled[list(q.modelled)].sum(axis=1, min_count=1)
+        values = modelled[list(q.modelled)].sum(axis=1, min_count=1) - modelled[list(q.less)].sum(axis=1)
         counts = (fluxes[f"{q.measured}_measured"] >= MEASURED_SHARE) & fluxes[q.measured].notna()
-        days[name] = pd.DataFrame({"measured": fluxes[q.measured], "modelled": values, "counts": counts})
+        days[name] = pd.DataFrame({"measured": fluxes[q.measured], "modelled": q.factor * values, "counts": counts})
     return days
 
 

@@ -7,8 +7,9 @@ from analysis import document
 from analysis.document import BLACK, BLUE, GREY, ORANGE, number
 from analysis.tower_comparison import QUANTITIES, scores
 
-PANELS = ("GPP", "ecosystem respiration", "latent heat", "sensible heat", "net radiation", "albedo")
-AXES = {"GPP": "gC m$^{-2}$ day$^{-1}$", "ecosystem respiration": "gC m$^{-2}$ day$^{-1}$", "albedo": "1"}
+PANELS = ("GPP", "ecosystem respiration", "net exchange", "latent heat", "sensible heat", "net radiation", "albedo")
+CARBON = "gC m$^{-2}$ day$^{-1}$"
+AXES = {"GPP": CARBON, "ecosystem respiration": CARBON, "net exchange": CARBON, "albedo": "1"}
 
 
 @document.styled
@@ -18,7 +19,7 @@ def draw(title: str, compared: dict[str, pd.DataFrame], swe: pd.Series, soil_lab
     swe : modelled snow water [mm] a day; soil_label : what was measured where; weeks : lines are means of 7 days, with
     the measured days as dots.
     """
-    figure = document.new_figure(8.5, 10.5)
+    figure = document.new_figure(8.5, 11.5)
     axes = figure.subplots(len(PANELS) + 1, 1, sharex=True)
     for ax, name in zip(axes, PANELS, strict=False):
         days = compared[name]

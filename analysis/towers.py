@@ -59,6 +59,7 @@ SE_SVB = Tower(
     fluxes={
         "gpp_gc_m2": ("GPP_umol", CARBON_G_PER_UMOL * 1800.0, "NEE_flag"),
         "respiration_gc_m2": ("Reco_umol", CARBON_G_PER_UMOL * 1800.0, "NEE_flag"),
+        "exchange_gc_m2": ("NEE_umol", CARBON_G_PER_UMOL * 1800.0, "NEE_flag"),
         "latent_heat_w_m2": ("LE", 1.0, "LE_flag"),
         "sensible_heat_w_m2": ("H", 1.0, "H_flag"),
         "net_radiation_w_m2": ("Rnet", 1.0, None),
@@ -115,9 +116,9 @@ def forcing(record: pd.DataFrame, tower: Tower) -> pd.DataFrame:
 def fluxes(record: pd.DataFrame, tower: Tower) -> pd.DataFrame:
     """The measured fluxes of a record, indexed like `forcing`.
 
-    Gross primary production and ecosystem respiration in gC m-2 per interval; heat fluxes and radiation in W m-2;
-    temperatures in degC. For each `<name>` a boolean `<name>_measured`: False where the value is missing or was
-    gap-filled by the station.
+    Gross primary production, ecosystem respiration and net exchange (uptake negative) in gC m-2 per interval; heat
+    fluxes and radiation in W m-2; temperatures in degC. For each `<name>` a boolean `<name>_measured`: False where the
+    value is missing or was gap-filled by the station.
     """
     record = _at_solar_time(record, tower)
     measured = {}

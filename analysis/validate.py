@@ -68,7 +68,7 @@ def assemble(parts: dict[str, Part]) -> str:
     rows = [[miss.where, miss.what, miss.likely] for part in parts.values() for miss in part.misses]
     listed = document.table(["where", "what", "process that is likely behind it"], rows, left=3) if rows else "Nothing."
     sections.append(f"## {len(PARTS) + 1}. What misses\n\n{listed}")
-    return "\n\n".join(sections) + "\n"
+    return document.fill("\n\n".join(sections)) + "\n"
 
 
 def make_writable(folder: Path) -> None:

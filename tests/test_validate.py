@@ -111,6 +111,12 @@ def test_numbers_of_the_document():
     assert document.table(["a", "b"], [["x", "1"]]) == "| a | b |\n| --- | ---: |\n| x | 1 |"
 
 
+def test_paragraphs_are_filled_and_tables_left_alone():
+    table = "| a |\n| --- |\n| " + "x" * 200 + " |"
+    text = document.fill("# Heading\n\nshort\nlines\n\n" + table)
+    assert text == "# Heading\n\nshort lines\n\n" + table
+
+
 def test_quick_run_writes_the_same_bytes_twice(tmp_path, capsys):
     for folder in ("first", "second"):
         run_script("analysis/validate.py", "--quick", "--parts", "seasons", "--output-dir", tmp_path / folder)
