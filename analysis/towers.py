@@ -4,6 +4,7 @@ The published records are in `analysis/observations`, with their sources and lic
 turned into local mean solar time, in which the simulator's sun stands highest at 12:00. Gaps in the weather
 are an error: no value is invented here. Gaps in the fluxes stay, with a flag for what was measured.
 """
+
 import gzip
 from dataclasses import dataclass
 from importlib.resources import files
@@ -57,9 +58,12 @@ SE_SVB = Tower(
     },
     fluxes={
         "gpp_gc_m2": ("GPP_umol", CARBON_G_PER_UMOL * 1800.0, "NEE_flag"),
+        "respiration_gc_m2": ("Reco_umol", CARBON_G_PER_UMOL * 1800.0, "NEE_flag"),
+        "exchange_gc_m2": ("NEE_umol", CARBON_G_PER_UMOL * 1800.0, "NEE_flag"),
         "latent_heat_w_m2": ("LE", 1.0, "LE_flag"),
         "sensible_heat_w_m2": ("H", 1.0, "H_flag"),
         "net_radiation_w_m2": ("Rnet", 1.0, None),
+        "net_shortwave_w_m2": ("SWnet", 1.0, None),
         "ground_heat_w_m2": ("G", 1.0, None),
         "soil_temperature_c": ("Tsoil5cm_C", 1.0, "Tsoil_flag"),
     },
@@ -75,18 +79,25 @@ def find(site: str) -> Tower:
     return TOWERS[site]
 
 
+def read_table(file: str) -> pd.DataFrame:
+    """A table of `analysis/observations`, packed or not, column for column."""
+    path = files("analysis") / "observations" / file
+    with path.open("rb") as raw:
+        return pd.read_csv(gzip.open(raw) if file.endswith(".gz") else raw)
+
+
 def read(tower: Tower) -> pd.DataFrame:
     """The published record, column for column, indexed by its time stamps."""
-    path = files("analysis") / "observations" / tower.file
-    with path.open("rb") as packed, gzip.open(packed) as table:
-        return pd.read_csv(table, index_col=tower.time_column, parse_dates=True)
+    table = read_table(tower.file)
+    return table.set_index(pd.to_datetime(table.pop(tower.time_column)))
 
 
 def forcing(record: pd.DataFrame, tower: Tower) -> pd.DataFrame:
     """The weather of a record, as `sim.simulate(forcing=...)` takes it.
 
-    Returns a row per interval, indexed by the local mean solar time at which it begins, with FORCING_COLUMNS:
-    means of the interval in degC, 1, m s-1 and W m-2, and its precipitation in mm. 29 February is dropped.
+    Returns a row per interval, indexed by the local mean solar time at which it begins, with those FORCING_COLUMNS
+    that the tower has: means of the interval in degC, 1, m s-1 and W m-2, and its precipitation in mm. 29 February is
+    dropped.
     Raises ValueError, naming column and time, for a missing value or interval.
     """
     record = _at_solar_time(record, tower)
@@ -105,9 +116,9 @@ def forcing(record: pd.DataFrame, tower: Tower) -> pd.DataFrame:
 def fluxes(record: pd.DataFrame, tower: Tower) -> pd.DataFrame:
     """The measured fluxes of a record, indexed like `forcing`.
 
-    Gross primary production in gC m-2 per interval; latent, sensible and ground heat and net radiation in
-    W m-2; soil temperature in degC. For each `<name>` a boolean `<name>_measured`: False where the value is
-    missing or was gap-filled by the station.
+    Gross primary production, ecosystem respiration and net exchange (uptake negative) in gC m-2 per interval; heat
+    fluxes and radiation in W m-2; temperatures in degC. For each `<name>` a boolean `<name>_measured`: False where the
+    value is missing or was gap-filled by the station.
     """
     record = _at_solar_time(record, tower)
     measured = {}
@@ -115,6 +126,19 @@ def fluxes(record: pd.DataFrame, tower: Tower) -> pd.DataFrame:
         measured[name] = factor * record[column]
         measured[f"{name}_measured"] = record[column].notna() & (True if flag is None else record[flag] == 0)
     return pd.DataFrame(measured)
+
+
+def daily_fluxes(fluxes: pd.DataFrame) -> pd.DataFrame:
+    """A record's fluxes by the day: carbon in gC m-2 day-1, the rest means; `<name>_measured` is the measured share.
+
+    NaN where an interval of the day is missing.
+    """
+    days = fluxes.groupby(fluxes.index.normalize())
+    complete = days.count() == days.size().iloc[0]
+    daily = days.mean().where(complete)
+    carbon = [name for name in fluxes if name.endswith("gc_m2")]
+    daily[carbon] = days[carbon].sum().where(complete[carbon])
+    return daily
 
 
 def _at_solar_time(record: pd.DataFrame, tower: Tower) -> pd.DataFrame:

@@ -1,0 +1,122 @@
+"""Held stands on sampled sites against the ranges that boreal forests show: a table and a figure."""
+
+import numpy as np
+
+from analysis import document
+from analysis.document import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, Miss, Part, number, percent
+from analysis.held_stands import KINDS, Run, hold
+from analysis.observed_bands import ALL, CHECKS, FELLED, WARMING, Check
+from analysis.scores import IN, Band
+
+SKIPPED_YEARS = 7
+KEPT_YEARS = 5
+UNDISTURBED = {"fire": False, "insects": False}
+COLOURS = dict(zip(ALL, (BLUE, ORANGE, GREEN, SKY, PURPLE, BLACK), strict=True))
+SHORT = dict(zip(ALL, ("conifer", "deciduous", "mixed", "young", "old", "open"), strict=True))
+
+
+def report(sites: int) -> Part:
+    """All kinds of stand on `sites` sites: the table, the figure, what misses."""
+    runs = run_all(sites)
+    values = {name: {kind: check.value(runs[kind]) for kind in check.shown} for name, check in CHECKS.items()}
+    rows, misses = [], []
+    for name, check in CHECKS.items():
+        cells = [_cell(check, kind, values[name]) for kind in ALL]
+        unit = "" if check.unit == "1" else f" [{check.unit}]"
+        rows.append([f"{name}{unit}", _limits(check), *cells, check.source])
+        for kind in check.bands:
+            misses += _miss(name, check, kind, values[name][kind])
+    pair_rows, pair_misses = _pairs(runs)
+    text = f"""{sites} sites drawn as for episodes of the environment, each with {SKIPPED_YEARS + KEPT_YEARS} years of
+its own weather, of which the last {KEPT_YEARS} are averaged; the same sites and weather for every stand. Stands are
+held: on every 1 January trees, soil carbon and organic layer are put back to those of the start. Mature is 1500
+stems/ha of 41-100 years, young of 21-40, old of more than 100, half of each species where mixed; open ground has no
+stems. Soil carbon is drawn, 2-10 kgC/m2 as in an episode. No fire, no insects. Cells are the median over the sites
+(10-90 %), the verdict of the median and the share of sites in the band; no verdict where the band is not meant for the
+stand.
+
+{document.table(["", "band", *ALL, "source"], rows, left=len(ALL) + 3)}
+
+What felling a stand of mature conifers does to the surface soil, on the same sites and weather: at once (the organic
+layer still that of the conifers) and when the organic layer has become that of open ground.
+
+{document.table(["", "warming [K]", "band"], pair_rows, left=3)}
+
+![Bands](images/validation_bands.png)"""
+    return Part(text, {"validation_bands.png": draw(values)}, [*misses, *pair_misses])
+
+
+def run_all(sites: int) -> dict[str, Run]:
+    """Every kind of `KINDS`, and felled conifers, by name."""
+    runs = {}
+    for kind, stocks in KINDS.items():
+        runs[kind] = hold(stocks, sites, KEPT_YEARS, SKIPPED_YEARS, UNDISTURBED, keep_daily=("swe_mm",))
+    layer = float(np.median(runs["mature conifer"].sites("organic_layer_m")))
+    runs[FELLED] = hold({**KINDS["open"], "organic_layer_m": layer}, sites, KEPT_YEARS, SKIPPED_YEARS, UNDISTURBED)
+    return runs
+
+
+def _limits(check: Check) -> str:
+    """The band, or one for each kind of stand where they differ."""
+    texts = {kind: f"{number(band.low, check.digits)} .. {number(band.high, check.digits)}"
+             for kind, band in check.bands.items()}  # fmt: skip
+    if len(set(texts.values())) == 1:
+        return next(iter(texts.values()))
+    return "; ".join(f"{SHORT[kind]} {text}" for kind, text in texts.items())
+
+
+def _cell(check: Check, kind: str, samples: dict[str, np.ndarray]) -> str:
+    if kind not in samples:
+        return "-"
+    low, median, high = (number(value, check.digits) for value in np.percentile(samples[kind], [10, 50, 90]))
+    text = f"{median} ({low} .. {high})"
+    return f"{text} {_verdict(check.bands[kind], samples[kind])}" if kind in check.bands else text
+
+
+def _verdict(band: Band, sample: np.ndarray) -> str:
+    verdict = band.verdict(float(np.median(sample)))
+    return f"{verdict if verdict == IN else f'**{verdict}**'}, {percent(band.share_within(sample))}"
+
+
+def _miss(name: str, check: Check, kind: str, sample: np.ndarray) -> list[Miss]:
+    median, band = float(np.median(sample)), check.bands[kind]
+    verdict = band.verdict(median)
+    if verdict == IN:
+        return []
+    limits = f"{number(band.low, check.digits)} .. {number(band.high, check.digits)}"
+    likely = check.low if "low" in verdict else check.high
+    return [Miss(kind, f"{name}: median {number(median, check.digits)}, band {limits}", likely)]
+
+
+def _pairs(runs: dict[str, Run]) -> tuple[list[list[str]], list[Miss]]:
+    """Surface soil of open ground less that of mature conifers on the same sites."""
+    forest = WARMING.value(runs["mature conifer"])
+    rows, misses = [], []
+    for label, kind in (("organic layer as it was", FELLED), ("organic layer of open ground", "open")):
+        sample = WARMING.value(runs[kind]) - forest
+        rows.append([label, _cell(WARMING, FELLED, {FELLED: sample}), _limits(WARMING)])
+        misses += _miss(f"warming of the surface soil [K], {label}", WARMING, FELLED, sample)
+    return rows, misses
+
+
+@document.styled
+def draw(values: dict[str, dict[str, np.ndarray]]) -> bytes:
+    """PNG: per quantity the median and 10-90 % of the sites of every kind, over the bands (grey)."""
+    figure = document.new_figure(8.5, 8.0)
+    axes = figure.subplots(4, 3).ravel()
+    for ax, (name, samples) in zip(axes, values.items(), strict=True):
+        check = CHECKS[name]
+        for row, kind in enumerate(ALL):
+            if kind in check.bands:
+                band = check.bands[kind]
+                ax.barh(row, band.high - band.low, left=band.low, height=0.8, color=GREY, alpha=0.35)
+            if kind in samples:
+                low, median, high = np.percentile(samples[kind], [10, 50, 90])
+                ax.plot([low, high], [row, row], color=COLOURS[kind], lw=2.5)
+                ax.plot(median, row, "o", color=COLOURS[kind], ms=5)
+        ax.set_yticks(range(len(ALL)), [SHORT[kind] for kind in ALL])
+        ax.invert_yaxis()
+        ax.set_title(name)
+        ax.set_xlabel("" if check.unit == "1" else check.unit)
+    figure.suptitle("Held stands on sampled sites: median and 10-90 % of sites, and the observed band (grey)")
+    return document.png(figure)

@@ -1,0 +1,107 @@
+"""The seasonal course of carbon and water fluxes of held mature stands, over that of boreal forest towers."""
+
+import calendar
+
+import numpy as np
+import pandas as pd
+
+from analysis import document, forest_towers
+from analysis.document import BLACK, BLUE, GREY, ORANGE, Miss, Part, number, percent
+from analysis.held_stands import KINDS, Run, hold
+from analysis.scores import skill
+
+KINDS_SHOWN = {"mature conifer": BLUE, "mature deciduous": ORANGE}
+YEARS = 5
+TOLERANCE = 0.2
+MARGIN = 0.05
+UNDISTURBED = {"fire": False, "insects": False}
+FLUXES = {"gpp": "GPP", "reco": "ecosystem respiration", "nee": "NEE, uptake negative", "et": "evapotranspiration"}
+UNITS = {"gpp": "gC m-2 day-1", "reco": "gC m-2 day-1", "nee": "gC m-2 day-1", "et": "mm day-1"}
+LIKELY = {
+    "gpp": "colder climate than any tower's; light use limited by the night's minimum in spring and autumn",
+    "reco": "little soil carbon (2-10 kgC/m2) with one slow pool in a cold climate; no understorey, no moss",
+    "nee": "GPP as observed, respiration too low: stands take up more than towers see",
+    "et": "colder climate than any tower's; autumn rain is scarce",
+}
+
+
+def modelled(run: Run) -> dict[str, np.ndarray]:
+    """Fluxes of each site and calendar month, (sites, 12), in `UNITS`."""
+    months = {name: 1000.0 * run.months[f"{name}_kgc_m2"].mean(axis=0)
+              for name in ("gpp", "autotrophic_respiration", "heterotrophic_respiration")}  # fmt: skip
+    reco = months["autotrophic_respiration"] + months["heterotrophic_respiration"]
+    water = run.months["evapotranspiration_mm"].mean(axis=0)
+    return {"gpp": months["gpp"], "reco": reco, "nee": reco - months["gpp"], "et": water}
+
+
+def measured() -> dict[str, pd.DataFrame]:
+    """Median course of each tower near the sampled climate, by flux: a row a site, columns months 1-12."""
+    sites = forest_towers.near_climate()
+    carbon = forest_towers.courses(forest_towers.carbon_fluxes())
+    water = forest_towers.courses(forest_towers.evapotranspiration())
+    table = {name: carbon[name].unstack() for name in ("gpp", "reco", "nee")} | {"et": water.unstack()}
+    courses = {name: values.reindex(columns=range(1, 13)).reindex(sites) for name, values in table.items()}
+    return {name: values.dropna(how="all") for name, values in courses.items()}
+
+
+def report(sites: int) -> Part:
+    """Courses of mature stands on `sites` sites over those of the towers: a table, a figure, what misses."""
+    runs = {kind: modelled(hold(KINDS[kind], sites, YEARS, mechanisms=UNDISTURBED)) for kind in KINDS_SHOWN}
+    towers = measured()
+    rows, misses = [], []
+    for name, label in FLUXES.items():
+        observed = towers[name].median()
+        cells = [number(value) for value in observed]
+        rows.append([f"{label} [{UNITS[name]}]", f"{len(towers[name])} towers", *cells, *[""] * 5])
+        for kind in KINDS_SHOWN:
+            course = np.median(runs[kind][name], axis=0)
+            s = skill(course, observed)
+            cells = [number(s.bias, sign=True), number(s.rmse), number(s.r)]
+            rows.append(["", kind, *(number(value) for value in course), *cells])
+            outside = [calendar.month_abbr[m] for m in range(1, 13) if _outside(course[m - 1], towers[name], m)]
+            verdict = "**MISS**" if abs(s.bias) > TOLERANCE * observed.abs().mean() else "in"
+            rows[-1] += [", ".join(outside) or "none", verdict]
+            if verdict != "in":
+                what = f"{label} over the year: bias {number(s.bias, sign=True)} {UNITS[name]}, towers' median course"
+                misses.append(Miss(kind, what, LIKELY[name]))
+    temperature = forest_towers.mean_annual_temperature()[forest_towers.near_climate()]
+    text = f"""Mature stands held as in part 1 on {sites} sites, {YEARS} years, over the towers in forests without a
+disturbance since {forest_towers.UNDISTURBED_BEFORE} and with a mean annual temperature of at most
+{forest_towers.WARMEST_C:g} degC: {", ".join(temperature.index)}. Carbon is from ABCflux, water from FLUXNET2015. The
+coldest of them has {number(temperature.min(), 1)} degC; the paper's sites have −10 to −5. Medians over sites, of
+towers each with the median of its years. A course misses if its bias exceeds {percent(TOLERANCE)} of the towers' mean
+magnitude; months outside are those in which it leaves the towers' range by more than {percent(MARGIN)} of their largest
+month.
+
+{document.table(["", "", *calendar.month_abbr[1:], "bias", "RMSE", "r", "months outside", "verdict"], rows, left=2)}
+
+![Seasonal courses](images/validation_seasons.png)"""
+    return Part(text, {"validation_seasons.png": draw(runs, towers)}, misses)
+
+
+def _outside(value: float, towers: pd.DataFrame, month: int) -> bool:
+    margin = MARGIN * towers.median().abs().max()
+    return bool(value < towers[month].min() - margin or value > towers[month].max() + margin)
+
+
+@document.styled
+def draw(runs: dict[str, dict[str, np.ndarray]], towers: dict[str, pd.DataFrame]) -> bytes:
+    """PNG: range and median of the towers (grey, black) and of the stands (10-90 % of sites)."""
+    figure = document.new_figure(8.5, 6.0)
+    month = np.arange(1, 13)
+    for ax, (name, label) in zip(figure.subplots(2, 2).ravel(), FLUXES.items(), strict=True):
+        measured = towers[name]
+        ax.fill_between(month, measured.min(), measured.max(), color=GREY, alpha=0.3, lw=0, label="towers, range")
+        ax.plot(month, measured.median(), color=BLACK, lw=1.5, label="towers, median")
+        for kind, colour in KINDS_SHOWN.items():
+            low, median, high = np.percentile(runs[kind][name], [10, 50, 90], axis=0)
+            ax.fill_between(month, low, high, color=colour, alpha=0.25, lw=0)
+            ax.plot(month, median, color=colour, lw=1.5, label=f"{kind}, 10-90 %")
+        ax.axhline(0.0, color=GREY, lw=0.6)
+        ax.set_xticks(month, [calendar.month_abbr[m][0] for m in month])
+        ax.set_title(label)
+        ax.set_ylabel(UNITS[name])
+    figure.axes[0].legend(loc="upper left")
+    document.headroom(figure.axes[0], 0.15)
+    figure.suptitle("Seasonal courses: mature stands on sampled sites and undisturbed boreal forest towers")
+    return document.png(figure)

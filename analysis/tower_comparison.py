@@ -1,0 +1,190 @@
+"""Fluxes of the simulator under a tower's weather, day by day beside the measured ones.
+
+A day counts if at least half of it was measured and none of it is missing; a month if it has five such days. Carbon is
+in gC m-2 day-1, heat in W m-2, temperature in degC.
+"""
+
+import calendar
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+import sim
+from analysis import document
+from analysis.document import Miss, number
+from analysis.held_stands import NO_CHANGE
+from analysis.scores import Skill, skill
+from analysis.tower_stands import TowerStand
+
+MJ_PER_DAY = 0.0864  # MJ m-2 day-1 of 1 W m-2
+MEASURED_SHARE = 0.5
+FEWEST_DAYS = 5
+SNOW_GONE_MM = 1.0
+SPRING_ENDS = 212
+DAYS_OF_SNOW_OFF = 7.0
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is compared: unit, column measured, columns modelled (their sum, less those of `less`) and their factor, and
+    the bias that counts as a miss, in the unit or as a share of the measured months' mean magnitude."""
+
+    unit: str
+    measured: str
+    modelled: tuple[str, ...]
+    factor: float = 1.0
+    tolerance: float = 0.2
+    relative: bool = True
+    digits: int = 1
+    less: tuple[str, ...] = ()
+
+
+RESPIRATION = ("autotrophic_respiration_kgc_m2", "heterotrophic_respiration_kgc_m2")
+QUANTITIES = {
+    "GPP": Quantity("gC m-2 day-1", "gpp_gc_m2", ("gpp_kgc_m2",), 1000.0, digits=2),
+    "ecosystem respiration": Quantity(
+        "gC m-2 day-1", "respiration_gc_m2", RESPIRATION, 1000.0, digits=2
+    ),
+    "net exchange": Quantity(
+        "gC m-2 day-1", "exchange_gc_m2", RESPIRATION, 1000.0, digits=2, less=("gpp_kgc_m2",)
+    ),
+    "latent heat": Quantity("W m-2", "latent_heat_w_m2", ("latent_heat_mj_m2",), 1.0 / MJ_PER_DAY),
+    "sensible heat": Quantity("W m-2", "sensible_heat_w_m2", ("sensible_heat_mj_m2",), 1.0 / MJ_PER_DAY),
+    "net radiation": Quantity("W m-2", "net_radiation_w_m2", ("net_radiation_mj_m2",), 1.0 / MJ_PER_DAY),
+    "ground heat": Quantity("W m-2", "ground_heat_w_m2", ("ground_heat_mj_m2",), 1.0 / MJ_PER_DAY),
+    "soil temperature": Quantity(
+        "degC", "soil_temperature_c", ("surface_soil_temperature_c",), tolerance=1.0, relative=False
+    ),
+    "albedo": Quantity("1", "albedo", ("albedo",), tolerance=0.03, relative=False, digits=3),
+}  # fmt: skip
+
+
+def simulate(stand: TowerStand, forcing: pd.DataFrame, index: pd.DatetimeIndex, repeats: int) -> pd.DataFrame:
+    """Daily output for the days `index` of the forcing's years, after running through them `repeats` - 1 times."""
+    years = len(forcing.index.year.unique())
+    daily = sim.simulate(
+        stand.site, NO_CHANGE, seed=0, years=repeats * years, forcing=forcing, initial=stand.initial,
+        constants=stand.constants, output="daily",
+    )  # fmt: skip
+    return daily[daily["year"] >= (repeats - 1) * years].set_index(index)
+
+
+def pair(fluxes: pd.DataFrame, modelled: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Per quantity a row a day: `measured`, `modelled`, and whether the day `counts`."""
+    days = {}
+    for name, q in QUANTITIES.items():
+        values = modelled[list(q.modelled)].sum(axis=1, min_count=1) - modelled[list(q.less)].sum(axis=1)
+        counts = (fluxes[f"{q.measured}_measured"] >= MEASURED_SHARE) & fluxes[q.measured].notna()
+        days[name] = pd.DataFrame({"measured": fluxes[q.measured], "modelled": q.factor * values, "counts": counts})
+    return days
+
+
+def by_month(days: pd.DataFrame) -> pd.DataFrame:
+    """Mean `measured` and `modelled` of the days that count and their number `days`, by (year, month); NaN for a month
+    with fewer than FEWEST_DAYS."""
+    counted = days[days["counts"]].dropna()
+    groups = counted.groupby([counted.index.year, counted.index.month])
+    number_of_days = groups.size()
+    months = groups[["measured", "modelled"]].mean().where(number_of_days >= FEWEST_DAYS)
+    return months.assign(days=number_of_days).rename_axis(["year", "month"])
+
+
+def scores(days: pd.DataFrame) -> tuple[Skill, Skill]:
+    """Skill of the months and of the days."""
+    months, counted = by_month(days), days[days["counts"]]
+    return skill(months["modelled"], months["measured"]), skill(counted["modelled"], counted["measured"])
+
+
+def climatology(days: pd.DataFrame) -> pd.DataFrame:
+    """`measured` and `modelled` by calendar month, each the mean of the years' months that count, 1 to 12."""
+    return by_month(days)[["measured", "modelled"]].groupby("month").mean().reindex(range(1, 13))
+
+
+def misses(name: str, days: pd.DataFrame) -> bool:
+    """Whether the bias of the months is beyond the quantity's tolerance."""
+    q, months = QUANTITIES[name], by_month(days)
+    scale = months["measured"].dropna().abs().mean() if q.relative else 1.0
+    return abs(scores(days)[0].bias) > q.tolerance * scale
+
+
+def skill_table(compared: dict[str, pd.DataFrame]) -> str:
+    """Markdown: bias, RMSE and correlation of months and days, the worst calendar month, the verdict."""
+    rows = []
+    for name, days in compared.items():
+        q, (months, single) = QUANTITIES[name], scores(days)
+        course = climatology(days)
+        worst = (course["modelled"] - course["measured"]).abs().idxmax()
+        gap = course.loc[worst, "modelled"] - course.loc[worst, "measured"]
+        cells = [f"{name} [{q.unit}]", number(by_month(days)["measured"].mean(), q.digits)]
+        for s in (months, single):
+            cells += [number(s.bias, q.digits, sign=True), number(s.rmse, q.digits), number(s.r, 2), str(s.pairs)]
+        cells += [f"{calendar.month_abbr[worst]} {number(gap, q.digits, sign=True)}"]
+        rows.append([*cells, "**MISS**" if misses(name, days) else "in"])
+    header = [
+        "",
+        "measured",
+        "months: bias",
+        "RMSE",
+        "r",
+        "n",
+        "days: bias",
+        "RMSE",
+        "r",
+        "n",
+        "worst month",
+        "verdict",
+    ]
+    return document.table(header, rows)
+
+
+def course_table(compared: dict[str, pd.DataFrame]) -> str:
+    """Markdown: measured and modelled by calendar month."""
+    rows = []
+    for name, days in compared.items():
+        q, course = QUANTITIES[name], climatology(days)
+        for kind in ("measured", "modelled"):
+            rows.append([f"{name}, {kind} [{q.unit}]", *(number(value, q.digits) for value in course[kind])])
+    return document.table(["", *calendar.month_abbr[1:]], rows)
+
+
+def find_misses(site: str, compared: dict[str, pd.DataFrame], likely: dict[str, str]) -> list[Miss]:
+    """Every quantity whose bias misses, with the likely process."""
+    found = []
+    for name, days in compared.items():
+        if misses(name, days):
+            q, months = QUANTITIES[name], by_month(days)
+            bias = number(scores(days)[0].bias, q.digits, sign=True)
+            unit = "" if q.unit == "1" else f" {q.unit}"
+            what = f"{name}: bias of months {bias}{unit}, measured {number(months['measured'].mean(), q.digits)}"
+            found.append(Miss(site, what, likely.get(name, "not known")))
+    return found
+
+
+def energy_closure(fluxes: pd.DataFrame, months: tuple[int, ...] = tuple(range(1, 13))) -> float:
+    """(H + LE) / (Rn - G) over days of these months on which all four were measured."""
+    names = ("sensible_heat_w_m2", "latent_heat_w_m2", "net_radiation_w_m2", "ground_heat_w_m2")
+    complete = (fluxes[[f"{name}_measured" for name in names]] >= MEASURED_SHARE).all(axis=1)
+    complete &= fluxes.index.month.isin(months) & fluxes[list(names)].notna().all(axis=1)
+    h, le, rn, g = (fluxes.loc[complete, name].sum() for name in names)
+    return (h + le) / (rn - g)
+
+
+def summer_evaporative_fraction(compared: dict[str, pd.DataFrame]) -> tuple[float, float]:
+    """LE / (LE + H) of June to August, measured and modelled: a ratio that does not depend on closure."""
+    latent, sensible = compared["latent heat"], compared["sensible heat"]
+    summer = latent["counts"] & sensible["counts"] & latent.index.month.isin([6, 7, 8])
+    latent, sensible = (days.loc[summer, ["measured", "modelled"]].sum() for days in (latent, sensible))
+    fraction = latent / (latent + sensible)
+    return fraction["measured"], fraction["modelled"]
+
+
+def melt_out(swe: np.ndarray) -> int:
+    """Day of year on which winter's snowpack is gone: the first bare one after its peak; swe : a year of days [mm].
+
+    The annual record's `snow_off_doy` also counts snow that falls on bare ground in May. 0 if nothing lies in spring.
+    """
+    spring = swe[:SPRING_ENDS]
+    peak = int(spring.argmax())
+    bare = np.flatnonzero(spring[peak:] <= SNOW_GONE_MM)
+    return peak + int(bare[0]) + 1 if len(bare) and bare[0] > 0 else 0

@@ -1,0 +1,96 @@
+"""Half-hours from days: what the day had is still there, and the sun and the warmth are where they should be."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import disaggregation
+from analysis.disaggregation import DiurnalCycle, diurnal_cycle, half_hours
+
+CYCLE = DiurnalCycle(half_range_per_shortwave=0.03, peak_hour=15.0)
+LATITUDE = 65.0
+
+
+def saturation(temperature):
+    return np.vectorize(disaggregation.saturation_water)(temperature)
+
+
+@pytest.fixture(scope="module")
+def daily():
+    days = pd.date_range("2012-01-01", "2012-12-31")
+    season = np.cos(2.0 * math.pi * (days.day_of_year - 190) / 365.25)
+    return pd.DataFrame(
+        {
+            "air_temperature_c": -3.0 + 18.0 * season,
+            "vapour_pressure_deficit_hpa": 0.35 * saturation(-3.0 + 18.0 * season),
+            "wind_speed_m_s": 2.5,
+            "shortwave_w_m2": 110.0 + 105.0 * season,
+            "longwave_w_m2": 260.0 + 60.0 * season,
+            "precipitation_mm": np.where(days.day_of_year % 3 == 0, 4.0, 0.0),
+        },
+        index=days,
+    )
+
+
+@pytest.fixture(scope="module")
+def hours(daily):
+    return half_hours(daily, LATITUDE, CYCLE)
+
+
+def test_daily_means_and_sums_are_those_of_the_record(daily, hours):
+    kept = daily.drop(pd.Timestamp("2012-02-29"))
+    mean = hours.groupby(hours.index.normalize()).mean()
+    for name in ("air_temperature_c", "wind_speed_m_s", "shortwave_w_m2", "longwave_w_m2"):
+        np.testing.assert_allclose(mean[name], kept[name], rtol=1e-12, atol=1e-9)
+    total = hours["precipitation_mm"].groupby(hours.index.normalize()).sum()
+    np.testing.assert_allclose(total, kept["precipitation_mm"], rtol=1e-12)
+
+
+def test_mean_vapour_pressure_deficit_is_that_of_the_record(daily, hours):
+    deficit = (
+        (saturation(hours["air_temperature_c"]) * (1.0 - hours["relative_humidity"]))
+        .groupby(hours.index.normalize())
+        .mean()
+    )
+    dry = deficit.index[hours["relative_humidity"].groupby(hours.index.normalize()).max() < 1.0]
+    assert len(dry) > 100
+    np.testing.assert_allclose(deficit[dry], daily.loc[dry, "vapour_pressure_deficit_hpa"], rtol=1e-6)
+
+
+def test_the_sun_is_highest_at_noon_and_night_is_dark(hours):
+    june = hours.loc["2012-06-21", "shortwave_w_m2"]
+    equinox = hours.loc["2012-03-20", "shortwave_w_m2"]
+    assert june.idxmax().hour in (11, 12) and (june > 0.0).sum() > 40
+    assert (equinox > 0.0).sum() == pytest.approx(24, abs=2)
+    assert equinox.iloc[0] == 0.0
+
+
+def test_a_day_without_sun_is_spread_evenly():
+    shape = disaggregation.sun_shape(pd.DatetimeIndex(["2012-12-21"]), 70.0)
+    np.testing.assert_array_equal(shape, 1.0)
+
+
+def test_warmest_hour_and_range_are_those_of_the_cycle(daily, hours):
+    day = hours.loc["2012-06-21", "air_temperature_c"]
+    assert day.idxmax().hour in (14, 15)
+    swing = CYCLE.half_range_per_shortwave * daily.loc["2012-06-21", "shortwave_w_m2"]
+    assert (day.max() - day.min()) / 2.0 == pytest.approx(swing, rel=0.01)
+
+
+def test_the_cycle_of_a_record_is_found_again(hours):
+    found = diurnal_cycle(hours["air_temperature_c"], hours["shortwave_w_m2"])
+    assert found.half_range_per_shortwave == pytest.approx(CYCLE.half_range_per_shortwave, rel=1e-6)
+    assert found.peak_hour == pytest.approx(CYCLE.peak_hour, abs=1e-6)
+
+
+def test_a_gap_and_an_impossible_deficit_name_column_and_day(daily):
+    gappy = daily.copy()
+    gappy.loc["2012-05-02", "wind_speed_m_s"] = np.nan
+    with pytest.raises(ValueError, match="wind_speed_m_s is missing on 2012-05-02"):
+        half_hours(gappy, LATITUDE, CYCLE)
+    dry = daily.copy()
+    dry.loc["2012-01-05", "vapour_pressure_deficit_hpa"] = 9.0
+    with pytest.raises(ValueError, match="9 hPa on 2012-01-05 is too large"):
+        half_hours(dry, LATITUDE, CYCLE)
