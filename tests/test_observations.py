@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import climate_records, forest_towers, poker_flat, tower_comparison, towers
+from analysis.validation import climate_records, forest_towers, poker_flat, tower_comparison, towers
 from sim.simulate import check_forcing
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from analysis.scores import Band, poisson_interval, skill
+from analysis.validation.scores import Band, poisson_interval, skill
 
 
 def test_skill_by_hand():

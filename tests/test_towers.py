@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import towers
+from analysis.validation import towers
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 from scripts import run_script
 
-from analysis import bands, calibration, climate_records, document, tower_comparison, validate, weather_report
-from analysis.held_stands import KINDS, hold
-from analysis.scores import Band
+from analysis import validate
+from analysis.validation import bands, calibration, climate_records, document, tower_comparison, weather_report
+from analysis.validation.held_stands import KINDS, hold
+from analysis.validation.scores import Band
 
 UNDISTURBED = {"fire": False, "insects": False}
 

@@ -5,10 +5,10 @@ import calendar
 import numpy as np
 import pandas as pd
 
-from analysis import document, forest_towers
-from analysis.document import BLACK, BLUE, GREY, ORANGE, Miss, Part, number, percent
-from analysis.held_stands import KINDS, Run, hold
-from analysis.scores import skill
+from analysis.validation import document, forest_towers
+from analysis.validation.document import BLACK, BLUE, GREY, ORANGE, Miss, Part, number, percent
+from analysis.validation.held_stands import KINDS, Run, hold
+from analysis.validation.scores import skill
 
 KINDS_SHOWN = {"mature conifer": BLUE, "mature deciduous": ORANGE}
 YEARS = 5

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from analysis import towers
+from analysis.validation import towers
 
 FAILED_G = 5.0  # gC m-2 month-1: a partitioning whose GPP or respiration is as negative as this has failed
 UNDISTURBED_BEFORE = 1950

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis import disaggregation, poker_flat, towers
+from analysis.validation import disaggregation, poker_flat, towers
 from sim.jit import uncompiled
 from sim.parameters import CONSTANTS
 from sim.weather import (

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis import tower_comparison
-from analysis.held_stands import KINDS, Run
-from analysis.scores import Band
+from analysis.validation import tower_comparison
+from analysis.validation.held_stands import KINDS, Run
+from analysis.validation.scores import Band
 
 SUMMER = (6, 7, 8)
 ALL = tuple(KINDS)

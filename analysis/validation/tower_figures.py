@@ -3,9 +3,9 @@
 import matplotlib.dates as dates
 import pandas as pd
 
-from analysis import document
-from analysis.document import BLACK, BLUE, GREY, ORANGE, number
-from analysis.tower_comparison import QUANTITIES, scores
+from analysis.validation import document
+from analysis.validation.document import BLACK, BLUE, GREY, ORANGE, number
+from analysis.validation.tower_comparison import QUANTITIES, scores
 
 PANELS = ("GPP", "ecosystem respiration", "net exchange", "latent heat", "sensible heat", "net radiation", "albedo")
 CARBON = "gC m$^{-2}$ day$^{-1}$"

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis import calibration, climate_records, document, forest_towers
-from analysis.climate_records import SEASONS, Climate
-from analysis.document import BLACK, BLUE, GREEN, ORANGE, Miss, Part, number
-from analysis.held_stands import KINDS, MONTH, Run, hold
+from analysis.validation import calibration, climate_records, document, forest_towers
+from analysis.validation.climate_records import SEASONS, Climate
+from analysis.validation.document import BLACK, BLUE, GREEN, ORANGE, Miss, Part, number
+from analysis.validation.held_stands import KINDS, MONTH, Run, hold
 from sim.parameters import CONSTANTS
 from sim.state import DAYS
 from sim.weather import snow_share

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from analysis import document
-from analysis.document import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, Miss, Part, number, percent
-from analysis.held_stands import KINDS, Run, hold
-from analysis.observed_bands import ALL, CHECKS, FELLED, WARMING, Check
-from analysis.scores import IN, Band
+from analysis.validation import document
+from analysis.validation.document import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, Miss, Part, number, percent
+from analysis.validation.held_stands import KINDS, Run, hold
+from analysis.validation.observed_bands import ALL, CHECKS, FELLED, WARMING, Check
+from analysis.validation.scores import IN, Band
 
 SKIPPED_YEARS = 7
 KEPT_YEARS = 5

@@ -4,10 +4,18 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from analysis import disaggregation, document, poker_flat, tower_comparison, tower_figures, tower_stands, towers
-from analysis.document import Miss, Part, number, percent
-from analysis.scores import skill
-from analysis.tower_comparison import QUANTITIES
+from analysis.validation import (
+    disaggregation,
+    document,
+    poker_flat,
+    tower_comparison,
+    tower_figures,
+    tower_stands,
+    towers,
+)
+from analysis.validation.document import Miss, Part, number, percent
+from analysis.validation.scores import skill
+from analysis.validation.tower_comparison import QUANTITIES
 
 SUMMER = (6, 7, 8)
 THAWED_C = 0.5  # of the soil at 5 cm under a snowpack that has gone
@@ -20,8 +28,8 @@ LIKELY = {
         "net exchange": "late summer: needles and soil are in step in the model, apart in the record (partitioning)",
         "latent heat": "transpiration follows net radiation and the night's minimum; canopy evaporation in autumn",
         "sensible heat": "the tower's energy balance is open: H + LE is too small in the record",
-        "ground heat": "one surface node of half a metre: the daily and the monthly wave are damped in it",
-        "soil temperature": "sensor at 5 cm, node over half a metre below the organic layer; winter's zero curtain",
+        "ground heat": "one surface node: the daily wave is damped in it",
+        "soil temperature": "one surface node below the organic layer, and no ice in that layer: winter's zero curtain",
         "albedo": "snow in the crowns changes no albedo; sky light and low sun",
     },
     "US-Prr": {
@@ -95,8 +103,8 @@ _INTRODUCTION = f"""The simulator takes the tower's weather instead of its own. 
 misses if the bias of its months exceeds 20 % of their mean magnitude,
 {QUANTITIES["soil temperature"].tolerance:g} degC, {QUANTITIES["albedo"].tolerance:g} of albedo, or, for the day that
 snow is gone, {tower_comparison.DAYS_OF_SNOW_OFF:g} days. The worst month has the largest gap. The stands are
-those of inventories (`analysis/tower_stands.py` has every value with its source). Of the simulator's constants one was
-calibrated on fluxes of these towers, the Priestley-Taylor coefficient of conifers (their latent heat of June to
+those of inventories (`analysis/validation/tower_stands.py` has every value with its source). Of the simulator's
+constants one was calibrated on fluxes of these towers, the Priestley-Taylor coefficient of conifers (their latent heat of June to
 August); those of the weather generator are not in play here."""
 
 
@@ -115,8 +123,8 @@ def _svartberget_text(comparison: Comparison) -> tuple[str, list[Miss]]:
 Pine and spruce in northern Sweden, 64.3 N, no permafrost; half-hourly weather. The tower's energy balance,
 (H + LE)/(Rn − G), closes to {number(tower_comparison.energy_closure(comparison.fluxes))}: a model that closes has to
 exceed its latent or sensible heat. LE/(LE + H) of June to August does not depend on that: measured
-{number(measured)}, modelled {number(modelled)}. Soil was measured at 5 cm; the modelled node is the mineral soil
-from 0 to 0.5 m below the organic layer. The record's respiration doubles within days in early August and halves in
+{number(measured)}, modelled {number(modelled)}. Soil was measured at 5 cm; the model's is the top of
+the mineral soil. The record's respiration doubles within days in early August and halves in
 mid-September, while the soil's temperature does neither; GPP, which is derived from it, follows. Net exchange is what
 was measured.
 
@@ -151,15 +159,15 @@ def _poker_flat_text(comparison: Comparison, repeats: int) -> tuple[str, list[Mi
     text = f"""### US-Prr, Poker Flat, 2011-14
 
 Black spruce, 2.4 m tall, on permafrost in interior Alaska, 65.1 N. The published weather is daily: it is spread over
-the day as `analysis/disaggregation.py` says (temperature by a cosine of half-range
+the day as `analysis/validation/disaggregation.py` says (temperature by a cosine of half-range
 {number(_spring_cycle().half_range_per_shortwave, 3)} K per W m⁻² of the day's shortwave with its peak at
 {number(_spring_cycle().peak_hour, 1)} h, both from the half-hourly spring of 2013; shortwave by the sun's height).
 Precipitation of frosty days is ERA-Interim's, because the gauge catches half of it. GPP and respiration are the
 daytime partitioning; the night-time one gives GPP of 0.7-1.4 gC m⁻² day⁻¹ in January and February. Net radiation is
 the sum of its four components (the published sum differs from it by up to 39 W m⁻² in months of 2011-13). From June
 to August (H + LE)/(Rn − G) is {number(closed)}, and LE/(LE + H) measured {number(measured)}, modelled
-{number(modelled)}. Soil was measured 5 cm below the 14 cm of moss, 0.19 m below the surface; the modelled node is the
-mineral soil from 0.30 to 0.80 m below it.
+{number(modelled)}. Soil was measured 5 cm below the 14 cm of moss, 0.19 m below the surface; the model's is the top of
+the mineral soil, 0.30 m below it.
 
 {tower_comparison.skill_table(pairs)}
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis import climate_records, document, poker_flat, tower_comparison, towers
-from analysis.climate_records import SEASONS, Climate
-from analysis.document import Miss, number
-from analysis.scores import skill
+from analysis.validation import climate_records, document, poker_flat, tower_comparison, towers
+from analysis.validation.climate_records import SEASONS, Climate
+from analysis.validation.document import Miss, number
+from analysis.validation.scores import skill
 from sim.parameters import CONSTANTS
 
 WET_MM = 1.0  # of a day that counts as wet, as in the generator

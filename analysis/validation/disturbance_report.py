@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis import document
-from analysis.document import Miss, Part, number
-from analysis.held_stands import KINDS, Run, hold
-from analysis.scores import IN, Band, poisson_interval
+from analysis.validation import document
+from analysis.validation.document import Miss, Part, number
+from analysis.validation.held_stands import KINDS, Run, hold
+from analysis.validation.scores import IN, Band, poisson_interval
 
 YEARS = 50
 MORTALITY_YEARS = 4

@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import document
-from analysis.document import Miss, number
-from analysis.held_stands import NO_CHANGE
-from analysis.scores import Skill, skill
-from analysis.tower_stands import TowerStand
+from analysis.validation import document
+from analysis.validation.document import Miss, number
+from analysis.validation.held_stands import NO_CHANGE
+from analysis.validation.scores import Skill, skill
+from analysis.validation.tower_stands import TowerStand
 
 MJ_PER_DAY = 0.0864  # MJ m-2 day-1 of 1 W m-2
 MEASURED_SHARE = 0.5
@@ -54,7 +54,7 @@ QUANTITIES = {
     "net radiation": Quantity("W m-2", "net_radiation_w_m2", ("net_radiation_mj_m2",), 1.0 / MJ_PER_DAY),
     "ground heat": Quantity("W m-2", "ground_heat_w_m2", ("ground_heat_mj_m2",), 1.0 / MJ_PER_DAY),
     "soil temperature": Quantity(
-        "degC", "soil_temperature_c", ("surface_soil_temperature_c",), tolerance=1.0, relative=False
+        "degC", "soil_temperature_c", ("soil_top_temperature_c",), tolerance=1.0, relative=False
     ),
     "albedo": Quantity("1", "albedo", ("albedo",), tolerance=0.03, relative=False, digits=3),
 }  # fmt: skip

@@ -1,0 +1,1 @@
+"""The simulator against reality: towers, observed ranges, the weather generator, disturbance."""
