@@ -104,8 +104,8 @@ misses if the bias of its months exceeds 20 % of their mean magnitude,
 {QUANTITIES["soil temperature"].tolerance:g} degC, {QUANTITIES["albedo"].tolerance:g} of albedo, or, for the day that
 snow is gone, {tower_comparison.DAYS_OF_SNOW_OFF:g} days. The worst month has the largest gap. The stands are
 those of inventories (`analysis/validation/tower_stands.py` has every value with its source). Of the simulator's
-constants one was calibrated on fluxes of these towers, the Priestley-Taylor coefficient of conifers (their latent heat of June to
-August); those of the weather generator are not in play here."""
+constants one was calibrated on fluxes of these towers, the Priestley-Taylor coefficient of conifers (their latent
+heat of June to August); those of the weather generator are not in play here."""
 
 
 def _misses(comparison: Comparison) -> list[Miss]:
