@@ -30,13 +30,13 @@ class Args:
     """file of the picture"""
 
 
-def read(folder: Path, name: str) -> pd.DataFrame:
+def read(folder: Path, name: str, text: tuple[str, ...] = ()) -> pd.DataFrame:
     """A table, or an end with the command that makes it."""
     path = folder / name
     if not path.exists():
         command = MADE_BY[next(key for key in sorted(MADE_BY, reverse=True) if folder.as_posix().endswith(key))]
         sys.exit(f"draw_conflict.py: {path} is missing; python analysis/{command} makes it")
-    return stored.read(path)
+    return stored.read(path, text)
 
 
 def draw_front(ax, front: pd.DataFrame, title: str):
@@ -122,7 +122,7 @@ def main(args: Args) -> None:
         ax.set_visible(False)
     for ax, site in zip(axes.flat, sites.sort_values("boundary_above_air_k").itertuples(), strict=False):
         path = path_of(args.results / "fronts", site.site_seed, ALL_ON)
-        front = plan_means(with_gains(read(path.parent, path.name)), "front")
+        front = plan_means(with_gains(read(path.parent, path.name, text=("actions",))), "front")
         title = f"boundary {site.boundary_above_air_k:.1f} K above air\nsnow {site.snow_mm_day:.1f} mm/day"
         points = draw_front(ax, front, title)
     upper.supxlabel("carbon gain over zero change", fontsize=9)

@@ -212,7 +212,7 @@ def main(args: Args) -> None:
         progress.show(done)
 
     rows = [{"site_seed": site_seed, "off": mechanism, **describe(site_seed),
-             **summarise(stored.read(path_of(folder, site_seed, mechanism)))}
+             **summarise(stored.read(path_of(folder, site_seed, mechanism), text=("actions",)))}
             for site_seed, mechanism in todo]  # fmt: skip
     summary = pd.DataFrame(rows)
     stored.write(folder / "summary.csv", summary, settings | {"arguments": {**asdict(args), "output_dir": None}})

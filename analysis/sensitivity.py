@@ -128,7 +128,7 @@ def variants() -> list[Variant]:
 # ------------------------------------------------------------------------------------------------ episodes
 
 
-def play(variant: Variant, site_seeds: list[int], weathers: int = WEATHERS, years: int = YEARS) -> pd.DataFrame:
+def play(variant: Variant, site_seeds: list[int], weathers: int, years: int) -> pd.DataFrame:
     """Mean returns over the weathers; a row for each site and plan."""
     design = [(site, weather, plan) for site in site_seeds for weather in range(weathers) for plan in PLANS.values()]
     sites = [sim.sample_site(site, variant.site) for site, _, _ in design]
@@ -147,7 +147,7 @@ def play_all(chosen: list[Variant], site_seeds: list[int], played) -> pd.DataFra
     """The variants side by side, one a core; `played` is called after each with their number."""
     with ThreadPoolExecutor(available_cores()) as pool:
         tables = []
-        for table in pool.map(lambda variant: play(variant, site_seeds), chosen):
+        for table in pool.map(lambda variant: play(variant, site_seeds, WEATHERS, YEARS), chosen):
             tables.append(table)
             played(1)
     return pd.concat(tables, ignore_index=True)
@@ -315,8 +315,7 @@ def main(args: Args) -> None:
 
     for group in todo:
         stored.write(paths[group], play_all(groups[group], site_seeds, played), made_by[group])
-    table = pd.concat([stored.read(path) for path in paths.values()], ignore_index=True)
-    table.value = table.value.fillna("").astype(str)
+    table = pd.concat([stored.read(path, text=("value",)) for path in paths.values()], ignore_index=True)
     stored.write(args.output_dir / "effects.csv", effects(table), settings)
     with protocol.replacing(args.document) as file:
         file.write(page(table).encode())

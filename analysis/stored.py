@@ -27,9 +27,11 @@ def write(path: Path, table: pd.DataFrame, settings: dict) -> None:
         table.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
 
 
-def read(path: Path) -> pd.DataFrame:
-    """A table that `write` wrote."""
-    return pd.read_csv(path, skiprows=1)
+def read(path: Path, text: tuple[str, ...] = ()) -> pd.DataFrame:
+    """A table that `write` wrote; text : columns that stay text though they look like numbers, empty cells included."""
+    table = pd.read_csv(path, skiprows=1, dtype=dict.fromkeys(text, str))
+    table[list(text)] = table[list(text)].fillna("")
+    return table
 
 
 def is_finished(path: Path, settings: dict) -> bool:

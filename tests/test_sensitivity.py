@@ -105,6 +105,22 @@ def test_a_variant_is_played():
     assert row == pytest.approx((first + second) / 2, rel=1e-12)
 
 
+def test_a_stopped_study_goes_on_with_the_groups_that_are_left(tmp_path, monkeypatch, capsys):
+    chosen = ("default", "soil_respiration", "mature_age_limit", next(iter(sensitivity.ALTERNATIVES)))
+    variants = [variant for variant in sensitivity.variants() if variant.factor in chosen]
+    for name, value in (("variants", lambda: variants), ("SITES", 1), ("WEATHERS", 1), ("YEARS", 2)):
+        monkeypatch.setattr(sensitivity, name, value)
+    args = sensitivity.Args(output_dir=tmp_path, document=tmp_path / "sensitivity.md")
+    sensitivity.main(args)
+    page = args.document.read_text()
+    assert "| `soil_respiration` | 0.4 | 0.6 | -" in page  # more respiration, less carbon
+    assert "| `mature_age_limit` | 90 |  |" in page
+    (tmp_path / "alternatives.csv").unlink()
+    sensitivity.main(args)
+    assert "3 of 4 groups are there" in capsys.readouterr().out
+    assert args.document.read_text() == page
+
+
 def test_refusals():
     with pytest.raises(SystemExit, match="--names nonsense"):
         run_script("analysis/sensitivity.py", "--names", "nonsense")
