@@ -24,7 +24,7 @@ from analysis.nsga2 import Budget
 YEARS = 50
 BLOCK_YEARS = 5
 FULL = Budget(population=40, generations=22, weathers=4, report_weathers=16)
-SMALL = Budget(population=24, generations=16, weathers=3, report_weathers=8)
+SMALL = Budget(population=24, generations=12, weathers=2, report_weathers=8)
 QUICK = Budget(population=16, generations=3, weathers=1, report_weathers=2)
 ALL_ON = "all on"
 RETURNS = [f"{name}_return" for name in open_loop.OBJECTIVES]
