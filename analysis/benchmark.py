@@ -1,0 +1,336 @@
+"""Speed: every figure the median of repeats that take turns, so that what else the machine does hits all alike.
+
+    python analysis/benchmark.py [--quick] [--only episode threads ...] [--run-dir runs/ppo_curriculum/.../seed1]
+
+Prints the machine and a table, and writes results/benchmark.csv and .md. A row's ratio is to the first row of its
+section and unit, taken repeat by repeat: ratios carry from machine to machine, times do not. `analysis/
+profile_kernel.py` splits a step of the physics into its phases.
+"""
+
+import io
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+
+import boreal_env
+import sim
+from analysis import protocol
+from analysis.machine import machine
+from sim.stands import LANES, available_cores, compile_kernels, draw_year
+from sim.state import DAYS
+
+COLUMNS = ("section", "what", "unit", "median", "low", "high", "ratio", "repeats", "paper")
+
+#: Our figure -> the paper's, a row of its table of running times.
+PAPER = {
+    "50-year episode, 1 stand": "episode_50_years_numba",
+    "async worker": "memory_per_env",
+    "training, total": "training_generalist_300k_steps",
+}
+
+#: A measurement gives its figures, (what, unit) -> value, anew each time it is called.
+Measurement = Callable[[], dict[tuple[str, str], float]]
+
+
+@dataclass
+class Args:
+    """Measures the speed of the simulator, of the environment and of its start."""
+
+    only: tuple[str, ...] = ()
+    """sections to measure: episode, stands, steps, threads, environment, memory, start, training (all by default)"""
+    quick: bool = False
+    """smaller sizes and fewer repeats, without the compilation: half a minute"""
+    repeats: int | None = None
+    """repeats of every figure (7; 3 with --quick)"""
+    run_dir: Path | None = None
+    """a training run, whose timing.csv gives the section training"""
+    output_dir: Path = Path("results")
+    """folder for benchmark.csv and benchmark.md"""
+
+
+# ------------------------------------------------------------------------------------------------ what is measured
+
+
+def seconds(work: Callable, *args, clock=time.perf_counter, **kwargs) -> float:
+    """Time of a call [s] by a clock; by `time.process_time` on one core, which other programs do not slow down."""
+    start = clock()
+    work(*args, **kwargs)
+    return clock() - start
+
+
+def start(stands: sim.Stands) -> None:
+    """Put stands on sampled sites, seeds 0, 1, .., and spin them up."""
+    numbers = np.arange(stands.number)
+    stands.start(numbers, [sim.sample_site(k) for k in numbers], [sim.episode_seeds(k) for k in numbers])
+
+
+def simulate(stands: sim.Stands, years: int) -> None:
+    """Let stands grow for some years."""
+    nothing = np.full(stands.number, boreal_env.NO_CHANGE)
+    for _ in range(years):
+        stands.step(nothing)
+
+
+def started(number: int, **kwargs) -> sim.Stands:
+    """Stands that are ready to be stepped."""
+    stands = sim.Stands(number, **kwargs)
+    start(stands)
+    return stands
+
+
+def counted(number: int, noun: str) -> str:
+    """1 stand, 2 stands."""
+    return f"{number} {noun}{'s' * (number > 1)}"
+
+
+def episode(args: Args, stack: ExitStack) -> list[Measurement]:
+    """An episode with its spin-up, per stand, on one core (processor time)."""
+    years = 10 if args.quick else 50
+
+    def measure(stands):
+        work = seconds(lambda: (start(stands), simulate(stands, years)), clock=time.process_time)
+        each = "" if stands.number == 1 else " in lockstep, each"
+        return {(f"{years}-year episode, {counted(stands.number, 'stand')}{each}", "s"): work / stands.number}
+
+    return [partial(measure, sim.Stands(n, threads=1)) for n in (1, 16, 32, 64)[: 2 if args.quick else None]]
+
+
+def per_step(stands: sim.Stands) -> float:
+    """Processor time of a step of a stand [ns], over whole years of at least sixteen stand-years."""
+    years = max(1, 16 // stands.number)
+    steps = stands.number * years * DAYS * stands.steps_per_day
+    return 1e9 * seconds(simulate, stands, years, clock=time.process_time) / steps
+
+
+def stands(args: Args, stack: ExitStack) -> list[Measurement]:
+    """Cost of a step against the number of stands, on one core (processor time)."""
+
+    def measure(stands):
+        return {(f"a step, {counted(stands.number, 'stand')}", "ns per stand"): per_step(stands)}
+
+    numbers = (1, 4, 16, 32) if args.quick else (1, 2, 4, 8, 16, 32, 64, 128)
+    return [partial(measure, started(n, threads=1)) for n in numbers]
+
+
+def steps(args: Args, stack: ExitStack) -> list[Measurement]:
+    """Cost against the length of the step, sixteen stands on one core (processor time)."""
+
+    def measure(minutes, stands):
+        step = per_step(stands)
+        year = 1e-6 * step * DAYS * stands.steps_per_day
+        return {(f"a year of {minutes}-minute steps", "ms per stand"): year,
+                (f"a {minutes}-minute step", "ns per stand"): step}  # fmt: skip
+
+    lengths = (30, 60) if args.quick else (30, 5, 10, 15, 60, 120)
+    return [partial(measure, m, started(16, threads=1, time_step_minutes=m)) for m in lengths]
+
+
+def threads(args: Args, stack: ExitStack) -> list[Measurement]:
+    """Stand-years a second against the number of threads, two blocks of sixteen stands a core."""
+
+    def measure(stands):
+        name = f"{counted(stands.threads, 'thread')}, {stands.number} stands"
+        return {(name, "stand-years per s"): stands.number / seconds(simulate, stands, 1)}
+
+    number = 32 * available_cores()
+    counts = sorted({1, available_cores()} if args.quick else {*range(1, min(available_cores(), 16) + 1)})
+    return [partial(measure, started(number, threads=count)) for count in counts]
+
+
+def physics_alone(groups: list[sim.Stands], pool: ThreadPoolExecutor) -> float:
+    """Time of a year of the physics and nothing else [s]: a call for each group of stands, on all cores."""
+    generator = np.random.default_rng(0)
+    draws = [np.array([draw_year(generator, generator) for _ in range(group.number)]) for group in groups]
+
+    def year(group, draw):
+        group._run(np.arange(group.number), draw, np.full(group.number, boreal_env.NO_CHANGE))
+
+    return seconds(lambda: list(pool.map(year, groups, draws)))
+
+
+def environment(args: Args, stack: ExitStack) -> list[Measurement]:
+    """Years a second of the environments without resets, and the share of the time that is not physics.
+
+    That share is 1 - (a year of the physics of as many stands on the same cores, alone) / (the environment's step).
+    """
+    years = 3 if args.quick else 10
+    pool = stack.enter_context(ThreadPoolExecutor(available_cores()))
+    make = partial(gym.make, "boreal-generalist-v0", disable_env_checker=True, years=1000)
+    asynchronous = partial(gym.vector.AsyncVectorEnv, autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
+    kinds = [("plain loop", 1, make)]
+    kinds += [("async", n, lambda n=n: asynchronous([make] * n)) for n in ((2,) if args.quick else (1, 2, 4, 8, 16))]
+    sizes = (1, 32) if args.quick else (1, 2, 4, 8, 16, 32, 64)
+    kinds += [("lockstep", n, lambda n=n: boreal_env.BorealVectorEnv(n, years=1000)) for n in sizes]
+
+    def measure(name, number, env, groups):
+        action = boreal_env.NO_CHANGE if name == "plain loop" else np.full(number, boreal_env.NO_CHANGE)
+        step = seconds(lambda: [env.step(action) for _ in range(years)]) / years
+        physics = sum(physics_alone(groups, pool) for _ in range(years)) / years
+        what = f"{name}, {counted(number, 'stand')}"
+        return {(what, "years per s"): number / step, (what, "% not physics"): 100.0 * (1.0 - physics / step)}
+
+    measurements = []
+    for name, number, factory in kinds:
+        env = factory()
+        stack.callback(env.close)
+        env.reset(seed=0)
+        groups = [started(number)] if name == "lockstep" else [started(1) for _ in range(number)]
+        measurements.append(partial(measure, name, number, env, groups))
+    return measurements
+
+
+def own_memory(process: int) -> float:
+    """Memory that a process shares with no other [MB] (its unique set size)."""
+    lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
+    return sum(int(line.split()[1]) for line in lines if line.startswith(("Private_Clean", "Private_Dirty"))) / 1024.0
+
+
+def memory(args: Args, stack: ExitStack) -> list[Measurement]:
+    """Memory of a worker of AsyncVectorEnv after a year; nothing where the system does not tell (Linux does)."""
+    if not Path("/proc/self/smaps_rollup").exists():
+        return []
+    make = partial(gym.make, "boreal-generalist-v0", disable_env_checker=True)
+    env = gym.vector.AsyncVectorEnv([make] * 2, autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
+    stack.callback(env.close)
+    env.reset(seed=0)
+    env.step(np.full(2, boreal_env.NO_CHANGE))
+
+    def measure():
+        workers = [own_memory(process.pid) for process in env.processes]
+        return {("async worker", "MB of its own"): statistics.mean(workers),
+                ("this process", "MB of its own"): own_memory(os.getpid())}  # fmt: skip
+
+    return [measure]
+
+
+STARTS = {
+    "import boreal_env": "import boreal_env",
+    "1 stand": "import boreal_env; boreal_env.warm_up(1)",
+    "16 stands": "import boreal_env; boreal_env.warm_up(16)",
+}
+
+
+def start_up(args: Args, stack: ExitStack) -> list[Measurement]:
+    """A new process until the physics is ready: compiled into an empty cache (once), and loaded from it."""
+    cache = os.environ | ({} if args.quick else {"NUMBA_CACHE_DIR": stack.enter_context(tempfile.TemporaryDirectory())})
+
+    def launch(name):
+        return seconds(subprocess.run, [sys.executable, "-c", STARTS[name]], check=True, env=cache)
+
+    first = {} if args.quick else {(f"first start, {name}", "s"): launch(name) for name in ("1 stand", "16 stands")}
+
+    def measure():
+        return first | {(f"later start, {name}", "s"): launch(name) for name in STARTS}
+
+    return [measure]
+
+
+def training(args: Args, stack: ExitStack) -> list[Measurement]:
+    """Where the time of a training run went, from its timing.csv."""
+    if args.run_dir is None:
+        return []
+    timing = pd.read_csv(args.run_dir / "timing.csv")
+    phases = timing.groupby("phase").seconds.sum()
+    figures = {("training, total", "min"): timing.elapsed_seconds.max() / 60.0}
+    figures |= {(f"training, {phase}", "min"): phases[phase] / 60.0 for phase in phases.index}
+    figures["training, steps", "steps per s"] = timing.global_step.max() / timing.elapsed_seconds.max()
+    return [lambda: figures]
+
+
+SECTIONS = {
+    "episode": episode, "stands": stands, "steps": steps, "threads": threads, "environment": environment,
+    "memory": memory, "start": start_up, "training": training,
+}  # fmt: skip
+FORKING = ("memory", "environment")  # have worker processes, which have to be there before the first thread
+
+# ------------------------------------------------------------------------------------------------ what is reported
+
+
+def run(args: Args) -> pd.DataFrame:
+    """Measure the sections wanted; a row a figure, columns `COLUMNS`."""
+    repeats = args.repeats or (3 if args.quick else 7)
+    wanted = [name for name in SECTIONS if name in args.only or not args.only]
+    samples = {}
+    with ExitStack() as stack:
+        measurements = []
+        for name in sorted(wanted, key=lambda name: name not in FORKING):
+            measurements += [(name, measurement) for measurement in SECTIONS[name](args, stack)]
+        progress = protocol.Progress("benchmark", repeats * len(measurements), "measurements")
+        for repeat in range(repeats):
+            for k, (name, measurement) in enumerate(measurements):
+                for (what, unit), value in measurement().items():
+                    samples.setdefault((name, what, unit), []).append(value)
+                progress.show(repeat * len(measurements) + k + 1)
+    paper = pd.read_csv(Path(__file__).parent / "paper_tables" / "runtime.csv", index_col="quantity")
+    rows, first = [], {}
+    for (name, what, unit), values in sorted(samples.items(), key=lambda item: wanted.index(item[0][0])):
+        base = first.setdefault((name, unit), values)
+        ratio = statistics.median(value / other for value, other in zip(values, base, strict=True))
+        theirs = "{low:g}-{high:g} {unit}".format(**paper.loc[PAPER[what]]) if what in PAPER else ""
+        rows.append((name, what, unit, statistics.median(values), min(values), max(values),
+                     np.nan if unit.startswith("%") else ratio, len(values), theirs))  # fmt: skip
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def short(value: float) -> str:
+    """Three digits, without an exponent."""
+    return f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
+
+
+def markdown(facts: dict[str, str], table: pd.DataFrame) -> str:
+    """The machine and the table, as Markdown that also reads well on a terminal."""
+    text = io.StringIO()
+    text.write(", ".join(f"{name} {value}" for name, value in facts.items()) + "\n\n")
+    cells = [["", "median", "low - high", "", "ratio", "paper"], ["-" * 48, "-:", "-:", "-", "-:", "-"]]
+    for row in table.itertuples():
+        spread = f"{short(row.low)} - {short(row.high)}" if row.repeats > 1 else ""
+        ratio = "" if np.isnan(row.ratio) else f"{row.ratio:.2f}"
+        cells.append([row.what, short(row.median), spread, row.unit, ratio, row.paper])
+    widths = [max(len(line[k]) for line in cells) for k in range(len(cells[0]))]
+    for line in cells:
+        padded = (f"{cell:{'<' if k in (0, 3, 5) else '>'}{widths[k]}}" for k, cell in enumerate(line))
+        text.write("| " + " | ".join(padded) + " |\n")
+    return text.getvalue()
+
+
+def main(args: Args) -> None:
+    """Measure, print and write."""
+    unknown = [name for name in args.only if name not in SECTIONS]
+    if unknown:
+        protocol.fail(f"--only {unknown[0]}: allowed are {', '.join(SECTIONS)}")
+    if args.repeats is not None and args.repeats < 1:
+        protocol.fail(f"--repeats {args.repeats}: at least 1 is needed")
+    if args.run_dir is not None and not (args.run_dir / "timing.csv").exists():
+        protocol.fail(f"--run-dir {args.run_dir}: it has no timing.csv")
+    try:
+        args.output_dir.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
+    facts = machine()
+    print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
+    compile_kernels(1)
+    compile_kernels(LANES)
+    table = run(args)
+    text = markdown(facts, table)
+    with protocol.replacing(args.output_dir / "benchmark.csv") as file:
+        table.to_csv(file, index=False, float_format=protocol.FLOAT_FORMAT, lineterminator="\n")
+    with protocol.replacing(args.output_dir / "benchmark.md") as file:
+        file.write(text.encode())
+    print(text + f"\nwrote {args.output_dir}/benchmark.csv and .md")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

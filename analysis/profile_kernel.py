@@ -1,0 +1,179 @@
+"""Where the time of a step goes: each phase of `sim.step.simulate_step`, alone and in turn.
+
+    python analysis/profile_kernel.py [--lanes 16] [--output-dir results]
+
+A block of stands is stepped to four moments of the year. There each phase is called many times on the block as the
+phases before it leave it, and beside them the whole step. The phases' sum need not be the whole: alone, a phase finds
+its fields in the nearest cache, and what the compiler shares between phases is done twice. The physics is compiled
+phase by phase, which takes half a minute.
+"""
+
+import math
+import statistics
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import numpy as np
+import pandas as pd
+
+from analysis import protocol
+from analysis.benchmark import per_step, started
+from analysis.machine import machine
+from sim import arrival, solve, step, transfer
+from sim.day import begin_day, end_day
+from sim.jit import OPTIONS
+from sim.stands import DRAWS_SIZE, LANES, STATE_SIZE, draw_year
+from sim.state import DAILY, block_dtype
+from sim.year import any_sun, begin_year
+
+STEPS_PER_DAY = 48
+SECONDS = 86400.0 / STEPS_PER_DAY
+MOMENTS = {  # name -> (day, step of the day)
+    "winter night": (30, 2),
+    "winter noon": (30, 24),
+    "summer night": (190, 2),
+    "summer noon": (190, 24),
+}
+COPIES = 4  # of the block, taken in turn, so that the compiler cannot do once what is to be done every time
+CALLS = 400
+
+#: The phases of a step in their order: name -> (function, arguments after the block). The canopy is solved together
+#: with the conductances it starts from, which are taken off again.
+PHASES = {
+    "generated_air": (step.generated_air, "cos_hour, sin_hour, SECONDS"),
+    "stores_before": (step.stores_before, ""),
+    "any_sun": (any_sun, "t, cos_hour, observed"),
+    "sunlight": (arrival.sunlight, "t, cos_hour, SECONDS, observed"),
+    "darkness": (arrival.darkness, ""),
+    "any_snow": (arrival.any_snow, ""),
+    "snowfall": (arrival.snowfall, "SECONDS"),
+    "no_snow": (arrival.no_snow, ""),
+    "rainfall": (arrival.rainfall, ""),
+    "conductances": (solve.conductances, "SECONDS"),
+    "solve_canopy": (solve.solve_canopy, ""),
+    "move_energy_and_water": (transfer.move_energy_and_water, "SECONDS"),
+    "move_carbon": (transfer.move_carbon, "SECONDS"),
+    "balance": (step.balance, "SECONDS"),
+}
+WHOLE = (step.simulate_step, "t, cos_hour, sin_hour, cos_hour > -0.9, SECONDS, observed")
+DAYS = {"begin_day": (begin_day, "day, observed"), "end_day": (end_day, "day, 48, daily")}  # once a day
+
+
+@dataclass
+class Args:
+    """Splits the time of a step of the physics into its phases."""
+
+    lanes: int = LANES
+    """stands in lockstep: 16 or 1"""
+    repeats: int = 15
+    """repeats of every figure, of which the median counts"""
+    output_dir: Path = Path("results")
+    """folder for profile_kernel.csv"""
+
+
+def repeated(*calls: tuple):
+    """A compiled function (blocks, number, day, t, cos_hour, sin_hour, observed, daily) that makes the calls."""
+    names = {f"phase_{k}": function for k, (function, _) in enumerate(calls)}
+    lines = [f"        phase_{k}({', '.join(filter(None, ['block', given]))})" for k, (_, given) in enumerate(calls)]
+    source = "def run(blocks, number, day, t, cos_hour, sin_hour, observed, daily):\n"
+    source += "    for k in range(number):\n        block = blocks[k % len(blocks)]\n" + "\n".join(lines)
+    namespace = {**names, "SECONDS": SECONDS}
+    exec(source, namespace)
+    return numba.njit(**OPTIONS)(namespace["run"])
+
+
+def nothing(lanes: int) -> tuple[np.ndarray, np.ndarray]:
+    """No observed forcing, no daily output."""
+    return np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes))
+
+
+def blocks_at(moments: dict, lanes: int) -> dict[str, tuple]:
+    """Sampled stands at the start of a step: name of the moment -> (block, day, t, cos_hour, sin_hour)."""
+    stands = started(lanes, threads=1)
+    generator = np.random.default_rng(0)
+    draws = np.array([draw_year(generator, generator) for _ in range(lanes)])
+    blocks = np.zeros(1, block_dtype(lanes))
+    rows = blocks.view("f8").reshape(-1, lanes)
+    first = stands.parameters.shape[1]
+    rows[:first] = stands.parameters.T
+    rows[first : first + STATE_SIZE] = stands.state.T
+    rows[first + STATE_SIZE : first + STATE_SIZE + DRAWS_SIZE] = draws.T
+    block, (observed, daily) = blocks[0], nothing(lanes)
+    begin_year(block)
+    found = {}
+    for day in range(1 + max(day for day, _ in moments.values())):
+        begin_day(block, day, observed)
+        for t in range(STEPS_PER_DAY):
+            angle = 2.0 * math.pi * ((t + 0.5) / STEPS_PER_DAY - 0.5)
+            cos_hour, sin_hour = math.cos(angle), math.sin(angle)
+            now = blocks.copy(), day, t, cos_hour, sin_hour
+            found |= {name: now for name, moment in moments.items() if moment == (day, t)}
+            lit = any_sun(block, t, cos_hour, observed)
+            step.simulate_step(block, t, cos_hour, sin_hour, lit, SECONDS, observed)
+        end_day(block, day, STEPS_PER_DAY, daily)
+    return found
+
+
+def time_calls(function, blocks: np.ndarray, now: tuple, repeats: int) -> float:
+    """Processor time of a call [ns per stand], the median of the repeats, each on fresh copies of the block."""
+    lanes = blocks["s"]["swe"].shape[1]
+    observed, daily = nothing(lanes)
+    times = []
+    for _ in range(repeats):
+        fresh = np.repeat(blocks, COPIES)
+        function(fresh, COPIES, *now, observed, daily)
+        start = time.thread_time()
+        function(fresh, CALLS, *now, observed, daily)
+        times.append(time.thread_time() - start)
+    return 1e9 * statistics.median(times) / (CALLS * lanes)
+
+
+def where_time_goes(lanes: int = LANES, repeats: int = 15) -> pd.DataFrame:
+    """Time of a step [ns per stand]: a row a phase, then their sum, the whole step, and what is done once a day, as
+    its part of a step; a column a moment."""
+    functions = {name: repeated(phase) for name, phase in {**PHASES, "whole step": WHOLE, **DAYS}.items()}
+    functions["solve_canopy"] = repeated(PHASES["conductances"], PHASES["solve_canopy"])
+    table = pd.DataFrame(0.0, index=[*PHASES, "sum", "whole step", *DAYS], columns=list(MOMENTS))
+    for moment, (blocks, *now) in blocks_at(MOMENTS, lanes).items():
+        table.loc["whole step", moment] = time_calls(functions["whole step"], blocks, now, repeats)
+        for name in DAYS:
+            table.loc[name, moment] = time_calls(functions[name], blocks, now, repeats) / STEPS_PER_DAY
+        observed, daily = nothing(lanes)
+        left_out = ["darkness" if any_sun(blocks[0], *now[1:3], observed) else "sunlight"]
+        for name in PHASES:
+            if name in left_out:
+                continue
+            table.loc[name, moment] = time_calls(functions[name], blocks, now, repeats)
+            functions[name](blocks, 1, *now, observed, daily)
+            if name == "any_snow":
+                left_out.append("no_snow" if arrival.any_snow(blocks[0]) else "snowfall")
+        table.loc["solve_canopy", moment] -= table.loc["conductances", moment]
+        table.loc["sum", moment] = table.loc[list(PHASES), moment].sum()
+    return table
+
+
+def main(args: Args) -> None:
+    """Measure, print and write."""
+    if args.lanes not in (1, LANES) or args.repeats < 1:
+        protocol.fail(
+            f"--lanes {args.lanes} --repeats {args.repeats}: 1 or {LANES} lanes, from 1 repeat on are allowed"
+        )
+    try:
+        args.output_dir.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
+    print(", ".join(f"{name} {value}" for name, value in machine().items()))
+    print("compiling the phases one by one, half a minute", flush=True)
+    table = where_time_goes(args.lanes, args.repeats)
+    print(f"ns per step and stand, {args.lanes} in lockstep\n" + table.to_string(float_format="%.1f"))
+    stands = started(args.lanes, threads=1)
+    year = statistics.median(per_step(stands) for _ in range(args.repeats))
+    print(f"a whole year, all that is done in it: {year:.1f}")
+    with protocol.replacing(args.output_dir / "profile_kernel.csv") as file:
+        table.to_csv(file, index_label="phase", float_format="%.4g", lineterminator="\n")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

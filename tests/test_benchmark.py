@@ -1,0 +1,79 @@
+"""The benchmark's quick mode gives every figure it promises. How fast anything is, is no test's business."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import benchmark, profile_kernel
+from analysis.machine import machine
+from analysis.protocol import TIMING_COLUMNS
+from sim import step
+from tests.scripts import run_script
+
+FIGURES = {
+    "episode": {"s"},
+    "stands": {"ns per stand"},
+    "steps": {"ms per stand", "ns per stand"},
+    "threads": {"stand-years per s"},
+    "environment": {"years per s", "% not physics"},
+    "memory": {"MB of its own"},
+    "start": {"s"},
+    "training": {"min", "steps per s"},
+}
+
+
+@pytest.fixture
+def run_dir(tmp_path):
+    rows = [("rollout", 2048, 6.0, 6.5), ("update", 2048, 2.0, 8.5), ("rollout", 4096, 6.0, 15.0)]
+    pd.DataFrame(rows, columns=TIMING_COLUMNS).to_csv(tmp_path / "timing.csv", index=False)
+    return tmp_path
+
+
+def test_every_section_has_positive_figures_in_its_units(run_dir):
+    table = benchmark.run(benchmark.Args(quick=True, repeats=1, run_dir=run_dir))
+    assert tuple(table.columns) == benchmark.COLUMNS
+    told = Path("/proc/self/smaps_rollup").exists()
+    figures = {name: units for name, units in FIGURES.items() if name != "memory" or told}
+    assert {name: set(rows.unit) for name, rows in table.groupby("section")} == figures
+    assert not table.duplicated(["section", "what", "unit"]).any()
+    figures = table[["median", "low", "high"]]
+    assert np.isfinite(figures.to_numpy()).all()
+    assert (figures[table.unit != "% not physics"] > 0.0).all(axis=None)
+    assert (table.repeats == 1).all()
+    first = table.drop_duplicates(["section", "unit"])
+    assert (first.ratio[first.unit != "% not physics"] == 1.0).all()
+
+    training = table[table.section == "training"].set_index("what")["median"]
+    assert training["training, total"] == 0.25
+    assert training["training, rollout"] == 0.2
+    assert training["training, steps"] == pytest.approx(4096 / 15)
+
+
+def test_the_script_writes_its_tables(tmp_path, capsys):
+    run_script("analysis/benchmark.py", "--quick", "--repeats", 1, "--only", "stands", "--output-dir", tmp_path)
+    table = pd.read_csv(tmp_path / "benchmark.csv")
+    assert tuple(table.columns) == benchmark.COLUMNS
+    assert set(table.section) == {"stands"}
+    text = (tmp_path / "benchmark.md").read_text()
+    assert text in capsys.readouterr().out
+    assert all(what in text for what in table.what)
+
+
+@pytest.mark.parametrize("arguments", [("--only", "everything"), ("--repeats", 0), ("--run-dir", "nowhere")])
+def test_a_bad_argument_is_refused(arguments, tmp_path):
+    with pytest.raises(SystemExit, match=f"{arguments[0]} {arguments[1]}"):
+        run_script("analysis/benchmark.py", *arguments, "--output-dir", tmp_path)
+
+
+def test_the_machine_is_named():
+    facts = machine()
+    assert {"processor", "cores", "python", "numba", "numpy"} <= set(facts)
+    assert all(facts.values())
+
+
+def test_the_profile_leaves_no_phase_of_a_step_out():
+    called = step.simulate_step.py_func.__code__.co_names
+    phases = {name for name in called if hasattr(step, name)} - {"observed_air"}
+    assert phases <= set(profile_kernel.PHASES)
