@@ -29,7 +29,9 @@ import boreal_env
 import sim
 from analysis import protocol
 from analysis.machine import machine
-from sim.stands import LANES, available_cores, compile_kernels, draw_year
+from sim.block import LANES, compile_kernels
+from sim.draws import draw_year
+from sim.stands import available_cores
 from sim.state import DAYS
 
 COLUMNS = ("section", "what", "unit", "median", "low", "high", "ratio", "repeats", "paper")

@@ -22,10 +22,11 @@ from analysis import protocol
 from analysis.benchmark import per_step, started
 from analysis.machine import machine
 from sim import arrival, solve, step, transfer
+from sim.block import LANES
 from sim.day import begin_day, end_day
+from sim.draws import draw_year
 from sim.jit import OPTIONS
-from sim.stands import DRAWS_SIZE, LANES, STATE_SIZE, draw_year
-from sim.state import DAILY, block_dtype
+from sim.state import DAILY, DRAWS_SIZE, STATE_SIZE, block_dtype
 from sim.year import any_sun, begin_year
 
 STEPS_PER_DAY = 48
@@ -43,7 +44,7 @@ CALLS = 400
 #: with the conductances it starts from, which are taken off again.
 PHASES = {
     "generated_air": (step.generated_air, "cos_hour, sin_hour, SECONDS"),
-    "stores_before": (step.stores_before, ""),
+    "stores_before": (step.stores_before, "seconds"),
     "any_sun": (any_sun, "t, cos_hour, observed"),
     "sunlight": (arrival.sunlight, "t, cos_hour, SECONDS, observed"),
     "darkness": (arrival.darkness, ""),

@@ -25,13 +25,15 @@ import pandas as pd
 
 import sim
 from analysis import protocol
+from sim.block import LANES, compile_kernels
+from sim.closure import TOLERANCES
 from sim.demography import AGES
 from sim.management import LARGEST_DENSITY, LEAST_DENSITY
 from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.snow import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.spin_up import CLASS_NAMES, INITIAL_LIMITS
-from sim.stands import LANES, PARAMETER_NAMES, STATE_NAMES, TOLERANCES, available_cores, compile_kernels
-from sim.state import DAILY, DAYS
+from sim.stands import available_cores
+from sim.state import DAILY, DAYS, PARAMETER_NAMES, STATE_NAMES
 from sim.year import LEAST_TRUNK_CAPACITY
 
 
@@ -252,7 +254,7 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         yield name, r[name], 0.0, np.inf
     yield "snowfall_mm", r["snowfall_mm"], 0.0, r["precipitation_mm"] * rounded
     yield "transpiration_mm", r["transpiration_mm"], 1.0 - rounded, np.inf
-    yield "active_layer_depth_m", r["active_layer_depth_m"], 0.0, s["organic_depth"] + p["deep_soil_depth_m"] * rounded
+    yield "active_layer_depth_m", r["active_layer_depth_m"], 0.0, s["organic_depth"] + p["boundary_depth_m"] * rounded
     planted, thinned = r["planted_stems_ha"] > 0.0, r["thinned_stems_ha"] > 0.0
     least, largest = np.where(thinned, LEAST_DENSITY, 0.0), np.where(planted, LARGEST_DENSITY, np.inf)
     yield "density_after_action", r["density_after_action"], least / rounded, largest * rounded

@@ -54,7 +54,7 @@ def conductances(b, seconds):
         transfer = min(w.vapour_density[i] * velocity, s.swe[i] / (seconds * drying))
         sky_and_canopy = longwave_down(w.sky[i], w.air_emission[i], w.longwave_cover[i])
         available = w.ground_sw[i] + p.ground_emissivity[i] * (sky_and_canopy - emission)
-        moist = p.priestley_taylor_ground[i] * equilibrium * w.water_stress[i] if w.air[i] > 0.0 else 0.0
+        moist = min(p.priestley_taylor_ground[i] * equilibrium * w.water_stress[i], 1.0) if w.air[i] > 0.0 else 0.0
         w.ground_latent[i] = (
             LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.humidity[i]) if snow else moist * max(available, 0.0)
         )

@@ -421,7 +421,8 @@ def bare_ground_latent_heat(p, s, air, rays, ground, seconds):
         return 0.0
     down = longwave_down(air.longwave, rays.cover, air.celsius)
     available = rays.ground + p.ground_emissivity * (down - black_body(ground))
-    return equilibrium(air) * p.priestley_taylor_ground * water_stress(p, s, seconds) * max(available, 0.0)
+    share = min(equilibrium(air) * p.priestley_taylor_ground * water_stress(p, s, seconds), 1.0)
+    return share * max(available, 0.0)
 
 
 def vapour_conductance(p, air, exchange, snow, seconds):

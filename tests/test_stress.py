@@ -6,31 +6,20 @@ import pytest
 
 import sim
 from analysis import stress
-from sim import stands as stands_module
+from sim.closure import TOLERANCES
 from sim.parameters import check_constants
-from sim.stands import RECORD_NAMES, STATE_NAMES
+from sim.state import RECORD_NAMES, STATE_NAMES
 from tests.scripts import run_script
 
 CORNERS = list(stress.GROUPS).index("sampled corners")  # a batch of this group is soon done
 
 
-BEYOND_ITS_LIMITS = pytest.mark.xfail(
-    strict=True,
-    reason="at corners of the constants' physical limits the ground can cool without bound by evaporation, and the "
-    "canopy's temperature lie beyond the 100 K about the air's in which it is looked for",
-)
-
-
-@pytest.mark.parametrize(
-    "number",
-    [pytest.param(k, id=name, marks=BEYOND_ITS_LIMITS if name == "all at once" else ())
-     for k, name in enumerate(stress.GROUPS)],
-)  # fmt: skip
+@pytest.mark.parametrize("number", range(len(stress.GROUPS)), ids=list(stress.GROUPS))
 def test_nothing_is_lost_negative_or_out_of_range(number):
     outcome = stress.run_batch(1, number)
     assert outcome.failures == []
     assert outcome.stand_years == stress.planned_years(number)
-    assert set(outcome.residuals) == {*stands_module.TOLERANCES, *stress.YEARLY_BUDGETS}
+    assert set(outcome.residuals) == {*TOLERANCES, *stress.YEARLY_BUDGETS}
     assert all(np.isfinite(residual) for residual in outcome.residuals.values())
 
 
@@ -83,7 +72,7 @@ def test_a_planted_fault_is_found(monkeypatch, table, column, change, kind, what
 
 
 def test_failures_are_tabulated_and_end_the_script_with_the_command_that_replays_them(monkeypatch, tmp_path, capsys):
-    monkeypatch.setitem(stands_module.TOLERANCES, "water_residual_mm", -1.0)
+    monkeypatch.setitem(TOLERANCES, "water_residual_mm", -1.0)
     with pytest.raises(SystemExit) as end:
         run_script("analysis/stress.py", "--stand-years", 401, "--seed", 2, "--output-dir", tmp_path)
     assert end.value.code == "2 failures in 2 batches"
@@ -91,7 +80,7 @@ def test_failures_are_tabulated_and_end_the_script_with_the_command_that_replays
     assert "python analysis/stress.py --seed 2 --batch 1" in printed
     residuals = pd.read_csv(tmp_path / "residuals.csv", index_col="group")
     assert residuals.loc[["sampled sites", "sampled corners"], "balance"].tolist() == [1, 1]
-    assert residuals.loc["tolerance", "energy_residual_w_m2"] == stands_module.TOLERANCES["energy_residual_w_m2"]
+    assert residuals.loc["tolerance", "energy_residual_w_m2"] == TOLERANCES["energy_residual_w_m2"]
     assert (pd.read_csv(tmp_path / "failures.csv").kind == "balance").all()
 
     with pytest.raises(SystemExit) as end:
@@ -106,7 +95,7 @@ def test_a_clean_run_ends_with_its_tables(tmp_path, capsys):
     ran = residuals.loc["sampled sites"]
     assert ran.stand_years == stress.planned_years(0)
     assert ran[["balance", "not_finite", "out_of_range"]].sum() == 0
-    assert (ran[list(stands_module.TOLERANCES)] <= pd.Series(stands_module.TOLERANCES)).all()
+    assert (ran[list(TOLERANCES)] <= pd.Series(TOLERANCES)).all()
     extremes = pd.read_csv(tmp_path / "extremes.csv")
     assert ((extremes.lowest >= extremes.allowed_low) & (extremes.highest <= extremes.allowed_high)).all()
     assert "tolerance" in capsys.readouterr().out
