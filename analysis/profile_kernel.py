@@ -44,7 +44,7 @@ CALLS = 400
 #: with the conductances it starts from, which are taken off again.
 PHASES = {
     "generated_air": (step.generated_air, "cos_hour, sin_hour, SECONDS"),
-    "stores_before": (step.stores_before, "seconds"),
+    "stores_before": (step.stores_before, "SECONDS"),
     "any_sun": (any_sun, "t, cos_hour, observed"),
     "sunlight": (arrival.sunlight, "t, cos_hour, SECONDS, observed"),
     "darkness": (arrival.darkness, ""),

@@ -90,7 +90,7 @@ class Args:
     """Runs random and extreme stand-years and checks that nothing is lost, negative or out of range."""
 
     stand_years: int = 100_000
-    """stand-years to run, at the least"""
+    """stand-years to plan, at the least; a batch in which a year does not close ends there"""
     seed: int = 1
     """of all that is drawn"""
     threads: int = available_cores()
@@ -254,7 +254,8 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         yield name, r[name], 0.0, np.inf
     yield "snowfall_mm", r["snowfall_mm"], 0.0, r["precipitation_mm"] * rounded
     yield "transpiration_mm", r["transpiration_mm"], 1.0 - rounded, np.inf
-    yield "active_layer_depth_m", r["active_layer_depth_m"], 0.0, s["organic_depth"] + p["boundary_depth_m"] * rounded
+    deepest = (s["organic_depth"] + p["boundary_depth_m"]) * rounded
+    yield "active_layer_depth_m", r["active_layer_depth_m"], 0.0, deepest
     planted, thinned = r["planted_stems_ha"] > 0.0, r["thinned_stems_ha"] > 0.0
     least, largest = np.where(thinned, LEAST_DENSITY, 0.0), np.where(planted, LARGEST_DENSITY, np.inf)
     yield "density_after_action", r["density_after_action"], least / rounded, largest * rounded

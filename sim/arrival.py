@@ -82,7 +82,7 @@ def any_snow(b):
     total = 0.0
     for i in range(len(s.swe)):
         total += w.snow[i] + s.canopy_snow[i] + s.swe[i]
-    return total > 0.0
+    return not total <= 0.0  # a lane that is not a number leaves the others their snow
 
 
 @phase
@@ -117,7 +117,7 @@ def snowfall(b, seconds):
         mixed = heat / (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i])
         s.ground[i] = mixed if ground_snow > 0.0 else s.ground[i]
         aged = snow_albedo(
-            s.albedo[i], s.ground[i], ground_snow, p.snow_albedo_fresh[i], p.snow_albedo_old[i],
+            s.albedo[i], s.ground[i], ground_snow, p.snow_albedo_fresh[i], p.snow_albedo_cold[i], p.snow_albedo_old[i],
             p.snow_albedo_cold_hours[i], p.snow_albedo_melt_hours[i], p.snow_albedo_refresh_mm[i], seconds,
         )  # fmt: skip
         s.albedo[i] = aged if s.swe[i] > 0.0 else p.snow_albedo_fresh[i]

@@ -9,9 +9,9 @@ import math
 from sim.jit import compiled
 from sim.mathematics import exponential
 from sim.radiation import black_body, black_body_slope, longwave_down, longwave_up
+from sim.snow import VON_KARMAN
 from sim.weather import FREEZING_POINT_K
 
-VON_KARMAN = 0.4
 NEWTON_TOLERANCE = 1e-7  # W m-2
 NEWTON_LIMIT = 60  # iterations; bisection alone would need 50
 

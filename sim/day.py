@@ -89,8 +89,10 @@ def wind_exchange(b, i, wind):
     """Exchange of a lane's ground [m s-1] and canopy [W m-2 K-1] with the air at a wind speed [m s-1]."""
     p, w = b.p, b.w
     crowns = w.cover_conifer[i] + w.cover_deciduous[i]
-    w.wind_below[i] = wind * (1.0 - p.wind_reduction[i] * crowns)
-    w.ground_velocity[i] = (w.snow_log[i] if b.s.swe[i] > SNOW_DAY_MM else w.ground_log[i]) * w.wind_below[i]
+    snow = b.s.swe[i] > SNOW_DAY_MM
+    sheltered = wind * (1.0 - p.wind_reduction[i] * crowns)
+    w.wind_below[i] = (w.snow_wind[i] if snow else w.ground_wind[i]) * sheltered
+    w.ground_velocity[i] = (w.snow_log[i] if snow else w.ground_log[i]) * sheltered
     exchange = w.air_density[i] * AIR_HEAT_CAPACITY * (w.canopy_log[i] * wind)
     w.canopy_air[i] = max(exchange, p.minimum_conductance[i]) * max(w.longwave_cover[i], 1e-3)
 

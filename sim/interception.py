@@ -1,5 +1,6 @@
 """Rain and snow held by the canopy. Stores in mm, fluxes in mm per step."""
 from sim.jit import compiled
+from sim.mathematics import cube_root
 
 LEAST_MELTING_LOAD = 0.05  # share of capacity; the last snow melts as fast as this much, not ever more slowly
 
@@ -23,14 +24,16 @@ def intercepted(fall, store, capacity, efficiency) -> float:
 def snow_sublimation(
     store, capacity, exposure, net, heat_transfer, deficit, slope, psychrometric, latent_heat, seconds
 ) -> float:
-    """Sublimation of intercepted snow [mm per step] from the exposed share of a full canopy (Penman 1948, over ice).
+    """Sublimation of intercepted snow [mm per step] (Penman 1948, over ice) from the exposed share of the canopy that
+    it covers, the power 2/3 of its load (FSM2).
 
     net : net radiation of the canopy at air temperature [W m-2]; heat_transfer : conductance to the air
     [W m-2 K-1]; deficit, slope : of vapour pressure over ice [hPa, hPa K-1]; psychrometric : constant [hPa K-1].
     """
-    load = min(store / capacity, 1.0) if capacity > 0.0 else 0.0
+    root = cube_root(min(store / capacity, 1.0)) if capacity > 0.0 else 0.0
+    covered = root * root
     demand = (slope * max(net, 0.0) + heat_transfer * max(deficit, 0.0)) / (slope + psychrometric)
-    return min(exposure * load * demand / latent_heat * seconds, store)
+    return min(exposure * covered * demand / latent_heat * seconds, store)
 
 
 @compiled

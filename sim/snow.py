@@ -11,6 +11,7 @@ LATENT_HEAT_VAPORISATION = 2.5e6  # J kg-1
 LATENT_HEAT_SUBLIMATION = LATENT_HEAT_FUSION + LATENT_HEAT_VAPORISATION
 AIR_HEAT_CAPACITY = 1005.0  # J kg-1 K-1
 GRAVITY = 9.81  # m s-2
+VON_KARMAN = 0.4
 MELTING_FROM_C = -0.01  # a melting pack is at 0 degC only to rounding
 
 
@@ -30,12 +31,15 @@ def conductivity(density: float) -> float:
 
 
 @compiled
-def snow_albedo(albedo, temperature, snowfall, fresh, old, cold_hours, melt_hours, refresh, seconds) -> float:
-    """Albedo after a step (FSM2): falls toward `old`, faster while melting; snowfall [mm] renews it."""
-    hours = melt_hours if temperature > MELTING_FROM_C else cold_hours
+def snow_albedo(albedo, temperature, snowfall, fresh, cold, old, cold_hours, melt_hours, refresh, seconds) -> float:
+    """Albedo after a step: falls toward `cold`, or faster toward `old` while melting; snowfall [mm] renews it (times of
+    FSM2, limits of CLASS, Verseghy 1991)."""
+    melting = temperature > MELTING_FROM_C
+    hours = melt_hours if melting else cold_hours
+    limit = old if melting else min(albedo, cold)
     ageing = seconds / (3600.0 * hours)
     renewal = snowfall / refresh
-    return (albedo + ageing * old + renewal * fresh) / (1.0 + ageing + renewal)
+    return (albedo + ageing * limit + renewal * fresh) / (1.0 + ageing + renewal)
 
 
 @compiled
@@ -46,9 +50,20 @@ def surface_albedo(swe, density, cover_depth, snow, ground) -> float:
 
 
 @compiled
+def ground_profile(wind_height, height, roughness, thermal_ratio) -> tuple[float, float]:
+    """Logarithmic profile over the ground: exchange velocity per wind speed at `wind_height`, and that wind's share at
+    `height`, where air temperature holds (FSM2). Heat has `thermal_ratio` of the roughness length of momentum."""
+    aloft = math.log(wind_height / roughness)
+    exchange = VON_KARMAN * VON_KARMAN / (aloft * math.log(height / (thermal_ratio * roughness)))
+    return exchange, math.log(height / roughness) / aloft
+
+
+@compiled
 def stability(surface, air, wind_below, height, damping, limit) -> float:
-    """Factor on turbulent exchange: 1 / (1 + 10 Ri) over a cold surface (FSM2), sqrt(1 - 10 Ri) over a warm one."""
-    richardson = GRAVITY * height * (air - surface) / ((air + FREEZING_POINT_K) * wind_below * wind_below)
+    """Factor on turbulent exchange: 1 / (1 + 10 Ri) over a cold surface (Price and Dunne 1976), and its counterpart
+    sqrt(1 + 10 |Ri|), limited, over a warm one. wind_below : at `height`."""
+    shear = max(wind_below * wind_below, 1e-6)
+    richardson = GRAVITY * height * (air - surface) / ((air + FREEZING_POINT_K) * shear)
     stable = 1.0 / (1.0 + damping * max(richardson, 0.0))
     unstable = min(math.sqrt(1.0 + damping * max(-richardson, 0.0)), limit)
     return stable if richardson > 0.0 else unstable

@@ -48,13 +48,14 @@ def conductances(b, seconds):
         ice = min(s.ground[i], 0.0)  # snow that falls on a warm skin is at 0 degC
         over_ice = saturation_pressure(ice)
         ice_slope = saturation_slope(ice, over_ice)
-        # No more snow than there is can sublimate within the step, even at 0 degC: the limit is on the conductance,
+        # At 0 degC, no more vapour is exchanged within the step than snow lies there: the limit is on the conductance,
         # so that the ground's equation and what is moved agree.
-        drying = max(SATURATION_AT_FREEZING_HPA - w.humidity[i], 1e-3)
+        drying = max(abs(SATURATION_AT_FREEZING_HPA - w.humidity[i]), 1e-3)
         transfer = min(w.vapour_density[i] * velocity, s.swe[i] / (seconds * drying))
         sky_and_canopy = longwave_down(w.sky[i], w.air_emission[i], w.longwave_cover[i])
         available = w.ground_sw[i] + p.ground_emissivity[i] * (sky_and_canopy - emission)
-        moist = min(p.priestley_taylor_ground[i] * equilibrium * w.water_stress[i], 1.0) if w.air[i] > 0.0 else 0.0
+        thawed = w.air[i] > 0.0 and s.ground[i] > 0.0
+        moist = min(p.priestley_taylor_ground[i] * equilibrium * w.water_stress[i], 1.0) if thawed else 0.0
         w.ground_latent[i] = (
             LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.humidity[i]) if snow else moist * max(available, 0.0)
         )

@@ -103,6 +103,7 @@ def move_energy_and_water(b, seconds):
         r.boundary_cooling_mj_m2[i] += 1e-6 * seconds * max(-deep_to_boundary, 0.0)
         w.reflected_sum[i] += w.reflected[i]
         w.shortwave_sum[i] += w.shortwave[i]
+        r.snow_heat_mj_m2[i] += 1e-6 * (w.advected[i] - carried)
         r.deep_heat_gain_mj_m2[i] += 1e-6 * seconds * (surface_to_deep - deep_to_boundary)
         w.soil_heat_sum[i] += 1e-6 * seconds * ground_to_surface
         w.thaw_heat[i] += seconds * max(surface_to_deep, 0.0) if w.surface[i] > 0.0 else 0.0
@@ -128,7 +129,7 @@ def move_carbon(b, seconds):
         conifer = autotrophic(w.gpp_conifer[i], conifer, p.growth_respiration[i], s.conifer_biomass[i], seconds)
         deciduous = autotrophic(w.gpp_deciduous[i], deciduous, p.growth_respiration[i], s.deciduous_biomass[i], seconds)
         warmth = q10_factor(w.soil_top[i], p.respiration_reference_c[i], w.log_q10[i])
-        soil = warmth * w.soil_rate[i] * s.soil_carbon[i] * seconds
+        soil = min(warmth * w.soil_rate[i] * seconds, 1.0) * s.soil_carbon[i]
         s.conifer_biomass[i] += w.gpp_conifer[i] * seconds - conifer
         s.deciduous_biomass[i] += w.gpp_deciduous[i] * seconds - deciduous
         s.soil_carbon[i] -= soil

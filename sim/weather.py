@@ -12,7 +12,7 @@ SOLAR_CONSTANT = 1361.0  # W m-2
 STEFAN_BOLTZMANN = 5.670374419e-8  # W m-2 K-4
 FREEZING_POINT_K = 273.15
 SATURATION_AT_FREEZING_HPA = 6.1121
-PSYCHROMETRIC_PER_HPA = 6.65e-4  # K-1; times the air pressure, gamma of Priestley and Taylor (1972)
+PSYCHROMETRIC_PER_HPA = 1005.0 / (0.622 * 2.5e6)  # K-1; heat capacity of air / latent heat; times the air pressure
 DAYS_PER_YEAR = 365
 LARGEST_RAIN_GROWTH = 1.0  # logarithm
 

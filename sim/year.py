@@ -5,14 +5,14 @@ A pure function of parameters, state, action and the year's random draws, all in
 import math
 
 from sim.account import clear_year, write_record
-from sim.canopy import VON_KARMAN, aerodynamic_conductance
+from sim.canopy import aerodynamic_conductance
 from sim.carbon import SECONDS_PER_YEAR, maintenance_rates
 from sim.day import begin_day, end_day
 from sim.demography import OLDEST, count, grow_older, recruits, remove_share, self_thinning
 from sim.disturbance import between, disturb
 from sim.jit import phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
-from sim.snow import LATENT_HEAT_FUSION
+from sim.snow import LATENT_HEAT_FUSION, ground_profile
 from sim.soil import organic_layer
 from sim.step import simulate_step
 from sim.structure import crown_areas
@@ -129,10 +129,11 @@ def site_constants(b, i):
     w.cos_warmest[i], w.sin_warmest[i] = math.cos(warmest), math.sin(warmest)
     peak = 2.0 * math.pi * p.peak_diurnal_hour[i] / 24.0
     w.cos_peak[i], w.sin_peak[i] = math.cos(peak), math.sin(peak)
-    height, rough = p.ground_reference_height_m[i], p.soil_roughness_m[i]
-    ground = VON_KARMAN / math.log(height / rough)
-    snow = VON_KARMAN / math.log(height / min(p.snow_roughness_m[i], rough))
-    w.ground_log[i], w.snow_log[i] = ground * ground, snow * snow
+    aloft, height, ratio = p.canopy_reference_height_m[i], p.ground_reference_height_m[i], p.thermal_roughness_ratio[i]
+    rough = p.soil_roughness_m[i]
+    smooth = min(p.snow_roughness_m[i], rough)
+    w.ground_log[i], w.ground_wind[i] = ground_profile(aloft, height, rough, ratio)
+    w.snow_log[i], w.snow_wind[i] = ground_profile(aloft, height, smooth, ratio)
     w.canopy_log[i] = aerodynamic_conductance(
         1.0, p.canopy_roughness_m[i], p.canopy_reference_height_m[i], p.excess_resistance[i]
     )

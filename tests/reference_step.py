@@ -21,7 +21,7 @@ GRAVITY = 9.81  # m s-2
 VON_KARMAN = 0.4
 GAS_CONSTANT = 287.05  # J kg-1 K-1, of dry air
 AIR_HEAT = 1005.0  # J kg-1 K-1
-PSYCHROMETRIC = 6.65e-4  # K-1, times the air pressure
+PSYCHROMETRIC = 1005.0 / (0.622 * 2.5e6)  # K-1, times the air pressure
 VAPOUR_RATIO = 0.622  # molar masses of water and air
 ICE_HEAT = 2100.0  # J kg-1 K-1
 FUSION = 3.34e5  # J kg-1
@@ -365,15 +365,15 @@ def ground_exchange(p, s, air, today, ground):
     snow = today.snow if today.weather.rows is None else s.swe
     roughness = min(p.snow_roughness_m, p.soil_roughness_m) if snow > 1.0 else p.soil_roughness_m
     wind = air.wind * (1.0 - p.wind_reduction * today.stand.cover)
-    if wind == 0.0:
-        return 0.0
-    height = p.ground_reference_height_m
-    richardson = GRAVITY * height * (air.celsius - ground) / ((air.celsius + FREEZING_K) * wind**2)
+    aloft, height = p.canopy_reference_height_m, p.ground_reference_height_m
+    low_wind = wind * math.log(height / roughness) / math.log(aloft / roughness)
+    richardson = GRAVITY * height * (air.celsius - ground) / ((air.celsius + FREEZING_K) * max(low_wind**2, 1e-6))
     if richardson > 0.0:
         stability = 1.0 / (1.0 + p.stability_factor * richardson)
     else:
         stability = min(math.sqrt(1.0 - p.stability_factor * richardson), p.instability_limit)
-    return today.air_density * AIR_HEAT * wind * (VON_KARMAN / math.log(height / roughness)) ** 2 * stability
+    logs = math.log(aloft / roughness) * math.log(height / (p.thermal_roughness_ratio * roughness))
+    return today.air_density * AIR_HEAT * wind * VON_KARMAN**2 / logs * stability
 
 
 def water_stress(p, s, seconds):
@@ -417,7 +417,7 @@ def evaporation_coefficients(p, s, air, today, rays, wet, seconds):
 
 def bare_ground_latent_heat(p, s, air, rays, ground, seconds):
     """Of snow-free ground [W m-2], from its net radiation under a canopy as warm as the air."""
-    if air.celsius <= 0.0:
+    if air.celsius <= 0.0 or ground <= 0.0:
         return 0.0
     down = longwave_down(air.longwave, rays.cover, air.celsius)
     available = rays.ground + p.ground_emissivity * (down - black_body(ground))
@@ -428,7 +428,7 @@ def bare_ground_latent_heat(p, s, air, rays, ground, seconds):
 def vapour_conductance(p, air, exchange, snow, seconds):
     """Of the snow's surface [mm s-1 hPa-1], at most such that snow at 0 degC lasts the step."""
     conductance = VAPOUR_RATIO / p.air_pressure_hpa * exchange / AIR_HEAT
-    return min(conductance, snow / (seconds * max(6.1121 - air.vapour, 1e-3)))
+    return min(conductance, snow / (seconds * max(abs(6.1121 - air.vapour), 1e-3)))
 
 
 # ----------------------------------------------------------------- 8. snow and rain in the canopy, snow on the ground
@@ -461,7 +461,8 @@ def snow_sublimation(p, air, store, capacity, net_radiation, exchange, seconds):
         return 0.0
     over_ice = air.gamma * VAPORISATION / SUBLIMATION
     rate = (air.slope * max(net_radiation, 0.0) + exchange * max(air.deficit, 0.0)) / (air.slope + over_ice)
-    return min(p.sublimation_exposure * min(store / capacity, 1.0) * rate / SUBLIMATION * seconds, store)
+    covered = max(min(store / capacity, 1.0), 1e-9) ** (2.0 / 3.0)
+    return min(p.sublimation_exposure * covered * rate / SUBLIMATION * seconds, store)
 
 
 def snow_melt(air, store, capacity, exchange, seconds):
@@ -515,9 +516,11 @@ def snow_albedo(p, s, ground, snowfall, snow, seconds):
     """After the step; snow that is to come is fresh."""
     if snow <= 0.0:
         return p.snow_albedo_fresh
-    hours = p.snow_albedo_melt_hours if ground > -0.01 else p.snow_albedo_cold_hours
+    melting = ground > -0.01
+    hours = p.snow_albedo_melt_hours if melting else p.snow_albedo_cold_hours
+    old = p.snow_albedo_old if melting else min(s.albedo, p.snow_albedo_cold)
     ageing, renewal = seconds / (3600.0 * hours), snowfall / p.snow_albedo_refresh_mm
-    return (s.albedo + ageing * p.snow_albedo_old + renewal * p.snow_albedo_fresh) / (1.0 + ageing + renewal)
+    return (s.albedo + ageing * old + renewal * p.snow_albedo_fresh) / (1.0 + ageing + renewal)
 
 
 # ------------------------------------------------------------------------------------------------- 10. ground heat

@@ -241,7 +241,7 @@ def test_snow_density():
     assert [snow.bulk_density(c, 217.0, 275.0) for c in (0.0, 0.5, 1.0)] == [275.0, 246.0, 217.0]
 
 
-ALBEDO = (0.85, 0.5, 1000.0, 100.0, 10.0, 1800.0)  # fresh, old, hours cold and melting, refreshing snowfall, step
+ALBEDO = (0.85, 0.7, 0.5, 1000.0, 100.0, 10.0, 1800.0)  # fresh, cold, old, hours cold and melting, refreshing, step
 
 
 @given(st.floats(0.5, 0.85), st.floats(-40.0, 0.0), st.floats(0.0, 50.0))
@@ -255,7 +255,8 @@ def test_snow_albedo_ages_to_old_and_is_renewed_by_snowfall():
         cold = snow.snow_albedo(cold, -5.0, 0.0, *ALBEDO)
         melting = snow.snow_albedo(melting, 0.0, 0.0, *ALBEDO)
     assert melting == approx(0.5 + 0.35 * math.exp(-1.0), abs=1e-3)
-    assert cold == approx(0.5 + 0.35 * math.exp(-0.1), abs=1e-3)
+    assert cold == approx(0.7 + 0.15 * math.exp(-0.1), abs=1e-3)
+    assert snow.snow_albedo(0.6, -5.0, 0.0, *ALBEDO) == approx(0.6)  # frost does not brighten what has melted
     assert snow.snow_albedo(0.5, -5.0, 10.0, *ALBEDO) == approx(0.675, abs=1e-3)
     assert snow.snow_albedo(0.5, -5.0, 1e6, *ALBEDO) == approx(0.85, abs=1e-3)
 
@@ -268,6 +269,17 @@ def test_snow_hides_the_ground():
         == snow.surface_albedo(90.0, 250.0, 0.1, 0.8, 0.2)
         == approx(0.8)
     )
+
+
+def test_ground_profile():
+    exchange, share = snow.ground_profile(10.0, 2.0, 0.001, 0.1)
+    assert exchange == approx(0.16 / (math.log(10.0 / 0.001) * math.log(2.0 / 0.0001)))
+    assert share == approx(math.log(2.0 / 0.001) / math.log(10.0 / 0.001))
+
+
+@given(st.floats(1e-9, 1e6))
+def test_cube_root(x):
+    assert sim.mathematics.cube_root(x) == approx(x ** (1.0 / 3.0), rel=2e-15)
 
 
 def test_stability():
@@ -494,7 +506,7 @@ def test_interception_shrinks_as_the_canopy_fills():
 def test_sublimation_of_intercepted_snow():
     penman = (3.0 * 50.0 + 20.0 * 1.0) / (3.0 + 0.65)
     mm = interception.snow_sublimation(5.0, 10.0, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0)
-    assert mm == approx(0.6 * 0.5 * penman / 2.834e6 * 1800.0)
+    assert mm == approx(0.6 * 0.5 ** (2.0 / 3.0) * penman / 2.834e6 * 1800.0)
     assert interception.snow_sublimation(1e-5, 1e-5, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0) == 1e-5
     assert interception.snow_sublimation(5.0, 10.0, 0.6, -50.0, 20.0, -1.0, 3.0, 0.65, 2.834e6, 1800.0) == 0.0
     assert interception.snow_sublimation(0.0, 0.0, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0) == 0.0
