@@ -37,9 +37,9 @@ def test_steps(name, steps):
 
 
 def test_a_step_stops_half_way_to_its_neighbour():
-    near = sim.CONSTANTS | {"snow_albedo_fresh": replace(sim.CONSTANTS["snow_albedo_fresh"], low=0.52, high=0.52)}
+    near = sim.CONSTANTS | {"snow_albedo_cold": replace(sim.CONSTANTS["snow_albedo_cold"], low=0.52, high=0.52)}
     assert sensitivity.levels("snow_albedo_old", near)[1] == pytest.approx(0.51)
-    assert sensitivity.levels("snow_albedo_fresh", near)[0] == pytest.approx(0.51)
+    assert sensitivity.levels("snow_albedo_cold", near)[0] == pytest.approx(0.51)
 
 
 def test_every_variant_can_be_run_and_every_parameter_varies():
