@@ -23,8 +23,8 @@ from analysis.nsga2 import Budget
 
 YEARS = 50
 BLOCK_YEARS = 5
-FULL = Budget(population=40, generations=22, weathers=4, report_weathers=16)
-SMALL = Budget(population=24, generations=12, weathers=2, report_weathers=8)
+FULL = Budget(population=36, generations=14, weathers=4, report_weathers=16)
+SMALL = Budget(population=24, generations=8, weathers=2, report_weathers=6)
 QUICK = Budget(population=16, generations=3, weathers=1, report_weathers=2)
 ALL_ON = "all on"
 RETURNS = [f"{name}_return" for name in open_loop.OBJECTIVES]

@@ -23,7 +23,7 @@ from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.stands import available_cores
 
 YEARS = 50
-SITES, WEATHERS = 4, 2
+SITES, WEATHERS = 4, 1
 TOP = 20
 SHARE = 0.1
 PLANS = {"zero change": 12, "conifers": 24, "deciduous": 20, "half": 22}
