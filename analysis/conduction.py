@@ -201,7 +201,7 @@ def thawed_depth(daily: np.ndarray, depths: np.ndarray) -> np.ndarray:
     return np.where((daily < 0.0).any(axis=1), front, depths[-1])
 
 
-def layer_mean(daily: np.ndarray, edges: tuple, depth: float) -> np.ndarray:
-    """Mean temperature [degC] from the mineral surface down to one of the edges, (days,)."""
-    inside = np.array(edges[1:]) <= depth
-    return daily[:, inside] @ np.diff(edges)[inside] / depth
+def layer_mean(temperatures: np.ndarray, edges: tuple, depth: float) -> np.ndarray:
+    """Mean [degC] from the mineral surface down to a depth, of temperatures (.., layers)."""
+    upper, lower = np.array(edges[:-1]), np.minimum(edges[1:], depth)
+    return temperatures @ np.maximum(lower - upper, 0.0) / depth

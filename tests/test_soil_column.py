@@ -133,6 +133,7 @@ def test_depth_of_the_uppermost_zero():
 
 def test_mean_of_the_layers_above_a_depth():
     assert layer_mean(np.array([[1.0, 4.0, 9.0]]), (0.0, 0.2, 0.3, 1.0), 0.3) == approx([2.0])
+    assert layer_mean(np.array([[1.0, 4.0, 9.0]]), (0.0, 0.2, 0.3, 1.0), 0.4) == approx([3.75])
 
 
 def test_grids_reach_the_boundary():
