@@ -1,0 +1,79 @@
+"""The surface that a stand's soil sees, step by step: ground temperature and the resistance of its snow.
+
+The simulator puts out daily means. But frost by night and thaw by day do not cancel, for frozen organic matter conducts
+twice as well as thawed: what is to feel the same surface as the simulator's soil has to see every step.
+"""
+
+import functools
+import math
+
+import numpy as np
+
+import sim
+from sim.day import begin_day, end_day
+from sim.jit import phase, specialised
+from sim.management import decode
+from sim.spin_up import climate_draws
+from sim.state import DAILY, DAYS, DRAWS, block_dtype
+from sim.step import simulate_step
+from sim.year import any_sun, begin_year, end_year
+
+NO_CHANGE = 12
+
+
+@phase
+def record_year(b, steps_per_day, no_weather, no_daily, surface):
+    """`sim.year.simulate_year` under generated weather, which writes `surface`, shape (2, steps, lanes): temperature
+    of the ground [degC] and resistance of the snow [m2 K W-1] at each step's end."""
+    begin_year(b)
+    seconds = 86400.0 / steps_per_day
+    for day in range(DAYS):
+        begin_day(b, day, no_weather)
+        for t in range(steps_per_day):
+            angle = 2.0 * math.pi * ((t + 0.5) / steps_per_day - 0.5)
+            cos_hour = math.cos(angle)
+            lit = any_sun(b, t, cos_hour, no_weather)
+            simulate_step(b, t, cos_hour, math.sin(angle), lit, seconds, no_weather)
+            for i in range(len(b.s.swe)):
+                surface[0, day * steps_per_day + t, i] = b.s.ground[i]
+                surface[1, day * steps_per_day + t, i] = b.s.swe[i] / (b.w.snow_density[i] * b.w.snow_conductivity[i])
+        end_day(b, day, steps_per_day, no_daily)
+    end_year(b)
+
+
+@functools.cache
+def kernel(lanes: int):
+    """`record_year` for so many stands, compiled at its first call or loaded from the disk cache."""
+    return specialised(record_year, f"{lanes}_recorded")
+
+
+class RecordedStands(sim.Stands):
+    """Stands that keep the surface of their last year.
+
+    surface : ground temperature [degC] and resistance of the snow [m2 K W-1] at each step's end, (2, stands, steps).
+    """
+
+    def climate_year(self) -> np.ndarray:
+        """The surface of the climate's mean year, with which `start` brought soil and snow into balance."""
+        mean = climate_draws()
+        draws = [np.broadcast_to(mean.get(name, 0.0), DAYS if daily else 1) for name, (daily, _) in DRAWS.items()]
+        draws = np.tile(np.concatenate(draws), (self.number, 1))
+        self._run(np.arange(self.number), draws, np.full(self.number, NO_CHANGE))
+        return self.surface
+
+    def _run(self, stands, draws, actions, *arguments, **options):
+        """The year as `sim.Stands` runs it, after a first time that records its surface, unless its steps are other
+        than the stands'."""
+        if options.get("steps_per_day", self.steps_per_day) == self.steps_per_day:
+            number = len(stands)
+            block = np.zeros(1, block_dtype(number))
+            given = np.concatenate([self.parameters[stands], self.state[stands], draws], axis=1).T
+            block.view("f8").reshape(-1, number)[: len(given)] = given
+            work = block[0]["w"]
+            work["density_change"], work["mix"] = decode(actions)
+            work["first_cut_age"], work["products_decay"] = self.first_cut_age, self.products_decay
+            surface = np.zeros((2, DAYS * self.steps_per_day, number))
+            nothing = np.zeros((0, 6, number)), np.zeros((0, len(DAILY), number))
+            kernel(number)(block[0], self.steps_per_day, *nothing, surface)
+            self.surface = np.ascontiguousarray(surface.transpose(0, 2, 1))
+        return super()._run(stands, draws, actions, *arguments, **options)
