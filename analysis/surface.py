@@ -36,7 +36,7 @@ def record_year(b, steps_per_day, no_weather, no_daily, surface):
             simulate_step(b, t, cos_hour, math.sin(angle), lit, seconds, no_weather)
             for i in range(len(b.s.swe)):
                 surface[0, day * steps_per_day + t, i] = b.s.ground[i]
-                surface[1, day * steps_per_day + t, i] = b.s.swe[i] / (b.w.snow_density[i] * b.w.snow_conductivity[i])
+                surface[1, day * steps_per_day + t, i] = b.s.swe[i] * b.w.snow_resistance[i]
         end_day(b, day, steps_per_day, no_daily)
     end_year(b)
 

@@ -4,6 +4,7 @@ import math
 from sim.demography import OLDEST, SAPLING_LIMIT, SEEDLING_LIMIT, count
 from sim.jit import phase
 from sim.soil import thaw_depth
+from sim.weather import FREEZING_POINT_K
 
 
 @phase
@@ -21,8 +22,8 @@ def clear_year(b, i):
     w.winter_down[i] = 0.0
     w.winter_air[i] = 0.0
     w.winter_days[i] = 0.0
-    w.surface_max[i] = -100.0
-    w.thaw_heat[i] = 0.0
+    w.thaw_warmth[i] = 0.0
+    w.thaw_seconds[i] = 0.0
 
 
 @phase
@@ -61,8 +62,11 @@ def write_record(b, i):
     r.summer_albedo[i] = w.summer_up[i] / w.summer_down[i] if w.summer_down[i] > 0.0 else math.nan
     r.winter_albedo[i] = w.winter_up[i] / w.winter_down[i] if w.winter_down[i] > 0.0 else math.nan
     r.organic_layer_m[i] = s.organic_depth[i]
+    freezes = p.soil_freezing[i]
+    thawed, frozen = p.soil_heat_capacity_thawed[i], p.soil_heat_capacity_frozen[i]
     r.active_layer_depth_m[i] = thaw_depth(
-        s.organic_depth[i] * p.moss[i], w.surface_max[i], p.surface_soil_depth_m[i], w.thaw_heat[i],
-        w.surface_latent[i] / p.surface_soil_depth_m[i], p.boundary_depth_m[i] - p.surface_soil_depth_m[i],
-        p.soil_freezing_range_k[i],
+        s.organic_depth[i] * p.moss[i], w.thaw_warmth[i], w.thaw_seconds[i], r.deep_soil_temperature_c[i],
+        p.deep_boundary_temperature_k[i] - FREEZING_POINT_K, p.deep_soil_node_m[i], p.boundary_depth_m[i],
+        p.soil_conductivity[i], p.soil_conductivity[i] * w.frozen_ratio[i], p.organic_conductivity_thawed[i],
+        thawed, thawed + freezes * (frozen - thawed), w.surface_latent[i] / p.surface_soil_depth_m[i],
     )  # fmt: skip

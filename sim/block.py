@@ -51,7 +51,7 @@ def run_block(
         kernel(lanes)(block[0], steps_per_day, days, forcing, output)
     else:
         with np.errstate(all="ignore"):
-            interpreted()(_namespace(block[0]), steps_per_day, days, forcing, output)
+            interpreted()(namespace(block[0]), steps_per_day, days, forcing, output)
     if daily is not None:
         daily[:] = output[:, :, :number].transpose(2, 0, 1)
     first = parameters.shape[1]
@@ -60,7 +60,7 @@ def run_block(
     return new_state, record
 
 
-def _namespace(record):
+def namespace(record):
     """A block as plain attributes, for the interpreter."""
     return SimpleNamespace(
         **{group: SimpleNamespace(**{n: record[group][n] for n in record[group].dtype.names}) for group in "pswrd"}

@@ -3,6 +3,8 @@
 Enthalpy in J m-2 with 0 at thawed soil of 0 degC. The water that freezes is a property of the column, apart from
 the bucket of `sim.water`.
 """
+import math
+
 from sim.jit import compiled
 
 
@@ -111,12 +113,25 @@ def respond_to_canopy(
 
 
 @compiled
-def thaw_depth(organic, surface_max, surface_thickness, heat_below, latent_per_metre, deep_thickness, freezing_range):
-    """Active-layer depth [m], from the organic surface.
+def thaw_depth(
+    organic, warmth, seconds, deep, boundary, deep_node, boundary_depth,
+    thawed_conductivity, frozen_conductivity, organic_conductivity, thawed_capacity, frozen_capacity, latent,
+):  # fmt: skip
+    """Active-layer depth [m], from the organic surface; down to the permafrost where that lies below the deep node.
 
-    The thawed share of the surface node at its warmest; once it is thawed whole, the depth below it whose ice the
-    heat that went down meanwhile could melt (Stefan). heat_below [J m-2]; latent_per_metre [J m-3].
+    Stefan's: what a season's warmth at the ground [K s], `seconds` long, conducts through organic layer and thawed soil
+    melts the water [latent, J m-3], warms thawed soil to half the mean temperature of its top, and goes on into soil
+    as cold as the deep node in the year's mean (Carslaw and Jaeger 1959, 2.4: 2 dT sqrt(k C t / pi)).
+    Capacities in J m-3 K-1.
     """
-    thawed = (1.0 - frozen_share(surface_max, freezing_range)) * surface_thickness
-    below = min(heat_below / latent_per_metre, deep_thickness) if latent_per_metre > 0.0 else deep_thickness
-    return organic + thawed + (below if surface_max > 0.0 else 0.0)
+    if deep > 0.0:
+        share = deep / (deep - boundary) if boundary < 0.0 else 1.0
+        return organic + deep_node + share * (boundary_depth - deep_node)
+    top = 0.5 * warmth / seconds if seconds > 0.0 else 0.0
+    heat = latent + 0.5 * thawed_capacity * top
+    cold = -2.0 * deep * math.sqrt(frozen_conductivity * frozen_capacity * seconds / math.pi)
+    above = organic * thawed_conductivity / organic_conductivity
+    linear = above * heat + 0.5 * cold
+    square = linear * linear + 2.0 * heat * (thawed_conductivity * warmth - above * cold)
+    front = (math.sqrt(max(square, 0.0)) - linear) / heat if heat > 0.0 else 0.0
+    return organic + min(max(front, 0.0), boundary_depth)

@@ -68,25 +68,33 @@ def conductances(b, seconds):
             s.deep_heat[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], p.soil_freezing_range_k[i]
         )
         frozen_value = p.soil_conductivity[i] * w.frozen_ratio[i]
-        soil_surface = conductivity(
+        # A node thicker than the front's daily reach freezes and thaws from above: its upper half is as the ground is.
+        soil_upper = conductivity(
+            frozen_share(s.ground[i], p.soil_freezing_range_k[i]), p.soil_conductivity[i], frozen_value
+        )
+        soil_lower = conductivity(
             frozen_share(w.surface[i], p.soil_freezing_range_k[i]), p.soil_conductivity[i], frozen_value
         )
         soil_deep = conductivity(
             frozen_share(w.deep[i], p.soil_freezing_range_k[i]), p.soil_conductivity[i], frozen_value
+        )
+        boundary = p.deep_boundary_temperature_k[i] - FREEZING_POINT_K
+        soil_below = conductivity(
+            frozen_share(0.5 * (w.deep[i] + boundary), p.soil_freezing_range_k[i]), p.soil_conductivity[i], frozen_value
         )
         organic = conductivity(
             frozen_share(0.5 * (s.ground[i] + w.surface[i]), p.soil_freezing_range_k[i]),
             p.organic_conductivity_thawed[i],
             p.organic_conductivity_frozen[i],
         )
-        w.upper_soil[i] = w.half_surface[i] / soil_surface
+        w.upper_soil[i] = w.half_surface[i] / soil_upper
         w.surface_conductance[i] = 1.0 / (
             s.swe[i] * w.snow_resistance[i]
             + s.organic_depth[i] * p.moss[i] / organic
             + w.upper_soil[i]
         )
-        w.deep_conductance[i] = 1.0 / (w.upper_soil[i] + w.above_deep_node[i] / soil_deep)
-        w.boundary_conductance[i] = soil_deep / w.below_deep_node[i]
+        w.deep_conductance[i] = 1.0 / (w.half_surface[i] / soil_lower + w.above_deep_node[i] / soil_deep)
+        w.boundary_conductance[i] = soil_below / w.below_deep_node[i]
 
         surface_inertia = (
             heat_capacity(
@@ -110,7 +118,7 @@ def conductances(b, seconds):
             emission, emission_slope, w.latent_slope[i], p.ground_emissivity[i], w.longwave_cover[i], w.air[i],
             w.surface[i], surface_inertia, w.surface_conductance[i],
             w.deep[i], deep_inertia, w.deep_conductance[i], w.boundary_conductance[i],
-            p.deep_boundary_temperature_k[i] - FREEZING_POINT_K,
+            boundary,
         )  # fmt: skip
         # At 0 degC some snow sublimates and the rest can melt; beyond, its heat capacity and its vapour are gone.
         sublimating = (w.ground_latent[i] - w.latent_slope[i] * ice) * seconds / LATENT_HEAT_SUBLIMATION

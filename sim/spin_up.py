@@ -150,11 +150,12 @@ def soil_node(parameters: dict, node: str) -> tuple[float, float, float, float]:
     """Heat capacities thawed and frozen [J m-2 K-1], latent heat [J m-2] and freezing range [K] of a soil node."""
     surface = parameters["surface_soil_depth_m"]
     thickness = surface if node == "surface" else parameters["boundary_depth_m"] - surface
+    freezing = thickness if node == "surface" else min(thickness, 2.0 * (parameters["deep_soil_node_m"] - surface))
     freezes = parameters["soil_freezing"]
     thawed = parameters["soil_heat_capacity_thawed"]
     frozen = thawed + freezes * (parameters["soil_heat_capacity_frozen"] - thawed)
     latent = freezes * LATENT_HEAT_FUSION * _WATER_DENSITY * parameters["soil_freezing_water"]
-    return thawed * thickness, frozen * thickness, latent * thickness, parameters["soil_freezing_range_k"]
+    return thawed * thickness, frozen * thickness, latent * freezing, parameters["soil_freezing_range_k"]
 
 
 def climate_draws() -> dict[str, np.ndarray]:

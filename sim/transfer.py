@@ -106,14 +106,14 @@ def move_energy_and_water(b, seconds):
         r.snow_heat_mj_m2[i] += 1e-6 * (w.advected[i] - carried)
         r.deep_heat_gain_mj_m2[i] += 1e-6 * seconds * (surface_to_deep - deep_to_boundary)
         w.soil_heat_sum[i] += 1e-6 * seconds * ground_to_surface
-        w.thaw_heat[i] += seconds * max(surface_to_deep, 0.0) if w.surface[i] > 0.0 else 0.0
+        w.thaw_warmth[i] += seconds * max(s.ground[i], 0.0)
+        w.thaw_seconds[i] += seconds if s.ground[i] > 0.0 else 0.0
         w.air_sum[i] += w.air[i]
         w.canopy_sum[i] += canopy
         w.ground_sum[i] += s.ground[i]
         w.top_sum[i] += w.soil_top[i]
         w.surface_sum[i] += w.surface[i]
         w.deep_sum[i] += w.deep[i]
-        w.surface_max[i] = max(w.surface_max[i], w.surface[i])
         r.canopy_residual_w_m2[i] = max(r.canopy_residual_w_m2[i], abs(w.residual[i]))
 
 

@@ -151,7 +151,9 @@ def site_constants(b, i):
     latent = freezes * LATENT_HEAT_FUSION * WATER_DENSITY * p.soil_freezing_water[i]
     w.surface_thawed[i], w.deep_thawed[i] = thawed * surface, thawed * deep
     w.surface_frozen[i], w.deep_frozen[i] = frozen * surface, frozen * deep
-    w.surface_latent[i], w.deep_latent[i] = latent * surface, latent * deep
+    w.surface_latent[i] = latent * surface
+    # Far below its node the deep soil has nearly the boundary's temperature, and stays frozen or thawed.
+    w.deep_latent[i] = latent * min(deep, 2.0 * (p.deep_soil_node_m[i] - surface))
     w.frozen_ratio[i] = 1.0 + freezes * (p.soil_frozen_conductivity_ratio[i] - 1.0)
     w.half_surface[i] = 0.5 * surface
     w.above_deep_node[i] = p.deep_soil_node_m[i] - surface

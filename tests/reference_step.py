@@ -563,7 +563,11 @@ def soil_nodes(p):
     frozen = p.soil_heat_capacity_frozen if p.soil_freezing else thawed
     latent = FUSION * WATER_DENSITY * p.soil_freezing_water if p.soil_freezing else 0.0
     thicknesses = (p.surface_soil_depth_m, p.boundary_depth_m - p.surface_soil_depth_m)
-    return [SoilNode(z, thawed * z, frozen * z, latent * z, p.soil_freezing_range_k) for z in thicknesses]
+    freezing = (thicknesses[0], min(thicknesses[1], 2.0 * (p.deep_soil_node_m - p.surface_soil_depth_m)))
+    return [
+        SoilNode(z, thawed * z, frozen * z, latent * wet, p.soil_freezing_range_k)
+        for z, wet in zip(thicknesses, freezing, strict=True)
+    ]
 
 
 def frozen_share(p, celsius):
@@ -585,13 +589,14 @@ def organic_resistance(p, s, ground, surface):
 
 def ground_conductances(p, s, nodes, ground, surface, deep, snow, density):
     """g_g1, g_12, g_2b [W m-2 K-1]."""
-    half_1 = nodes[0].thickness / 2.0 / soil_conductivity(p, surface)
+    half = nodes[0].thickness / 2.0
+    boundary = p.deep_boundary_temperature_k - FREEZING_K
     to_deep = (p.deep_soil_node_m - p.surface_soil_depth_m) / soil_conductivity(p, deep)
     snow_resistance = snow / density / snow_conductivity(density)
     return (
-        1.0 / (snow_resistance + organic_resistance(p, s, ground, surface) + half_1),
-        1.0 / (half_1 + to_deep),
-        soil_conductivity(p, deep) / (p.boundary_depth_m - p.deep_soil_node_m),
+        1.0 / (snow_resistance + organic_resistance(p, s, ground, surface) + half / soil_conductivity(p, ground)),
+        1.0 / (half / soil_conductivity(p, surface) + to_deep),
+        soil_conductivity(p, 0.5 * (deep + boundary)) / (p.boundary_depth_m - p.deep_soil_node_m),
     )
 
 
@@ -835,7 +840,7 @@ def take_step(p, s, today, step, steps_per_day):
         for species in SPECIES
     }
     into_soil = g_g1 * (ground - surface)
-    top = top_of_mineral_soil(p, soil_conductivity(p, surface_start), surface, into_soil)
+    top = top_of_mineral_soil(p, soil_conductivity(p, ground_start), surface, into_soil)
     decay = heterotrophic_respiration(p, s, top)
 
     state = {

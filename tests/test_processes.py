@@ -336,11 +336,21 @@ def test_organic_layer_grows_slowly_and_decays_when_its_canopy_is_gone():
 
 
 def test_thaw_depth_of_stefan():
-    latent = 3.34e5 * 1000.0 * 0.26
-    assert soil.thaw_depth(0.1, -1.0, 0.5, 0.0, latent, 4.5, 1.0) == approx(0.1)
-    assert soil.thaw_depth(0.1, -0.5, 0.5, 9e9, latent, 4.5, 1.0) == approx(0.35)
-    assert soil.thaw_depth(0.1, 5.0, 0.5, 0.3 * latent, latent, 4.5, 1.0) == approx(0.9)
-    assert soil.thaw_depth(0.1, 5.0, 0.5, 9e9, latent, 4.5, 1.0) == approx(5.1)
+    latent, warmth, days = 86.8e6, 8.0 * 86400.0 * 120, 86400.0 * 120
+    rest = (-3.0, 2.5, 12.0, 1.2, 1.7, 0.2)  # boundary, deep node, boundary's depth, conductivities
+    # Without moss, cold soil or heat capacity: sqrt(2 k T t / L).
+    assert soil.thaw_depth(0.0, warmth, days, 0.0, *rest, 0.0, 0.0, latent) == approx(
+        math.sqrt(2.4 * warmth / latent), rel=1e-12
+    )
+    # What goes in is what melts, warms and goes on: k T t = (above + X / 2) (heat X + cold).
+    depth = soil.thaw_depth(0.1, warmth, days, -2.0, *rest, 2.3e6, 1.7e6, latent) - 0.1
+    heat, cold = latent + 2.3e6 * 2.0, 4.0 * math.sqrt(1.7 * 1.7e6 * days / math.pi)
+    assert (0.1 * 1.2 / 0.2 + 0.5 * depth) * (heat * depth + cold) == approx(1.2 * warmth, rel=1e-12)
+    assert 0.8 < depth < 1.0
+    assert soil.thaw_depth(0.1, 0.0, 0.0, -2.0, *rest, 2.3e6, 1.7e6, latent) == 0.1
+    # A deep node that is thawed: permafrost begins on the line from it to the boundary.
+    assert soil.thaw_depth(0.1, warmth, days, 1.0, *rest, 2.3e6, 1.7e6, latent) == approx(0.1 + 2.5 + 9.5 / 4.0)
+    assert soil.thaw_depth(0.1, warmth, days, 1.0, 2.0, *rest[1:], 2.3e6, 1.7e6, latent) == approx(12.1)
 
 
 def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():

@@ -381,7 +381,7 @@ BAD = {
         {"constants": {"surface_soil_depth_m": 2.0, "deep_soil_node_m": 1.0}},
         r"surface_soil_depth_m.*deep_soil_node_m",
     ),
-    "boundary within the soil": ({"constants": {"boundary_depth_m": 3.0}}, r"deep_soil_node_m.*boundary_depth_m"),
+    "boundary within the soil": ({"constants": {"deep_soil_node_m": 12.0}}, r"deep_soil_node_m.*boundary_depth_m"),
     "unknown mechanism": ({"mechanisms": {"browsing": False}}, r"unknown mechanism 'browsing'; allowed: moss"),
     "mechanism half on": ({"mechanisms": {"fire": 0.5}}, r"mechanism 'fire': True or False is allowed, got 0.5"),
     "half-life 0": ({"hwp_half_life_years": 0}, r"hwp_half_life_years: .*number.* is allowed, got 0"),

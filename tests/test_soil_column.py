@@ -12,12 +12,12 @@ from analysis import soil_column
 from analysis.conduction import Column, Grid, Ground, Surface, layer_mean, spun_up, thawed_depth
 from analysis.soil_column import LAYER_EDGES_M, SCHEMES, layers_to
 from analysis.surface import record_year
+from sim.block import namespace
 from sim.jit import uncompiled
 from sim.parameters import check_constants, check_mechanisms
 from sim.solve import conductances
 from sim.spin_up import INITIAL_RANGES, first_state
-from sim.stands import PARAMETER_NAMES, _namespace
-from sim.state import DAILY, DAYS, block_dtype
+from sim.state import DAILY, DAYS, PARAMETER_NAMES, block_dtype
 from sim.year import simulate_year
 
 PARAMETERS = {**sim.middle_site(), **check_constants(None), **check_mechanisms(None)}
@@ -37,7 +37,7 @@ def block():
     given = np.concatenate([[PARAMETERS[name] for name in PARAMETER_NAMES], state])
     record.view("f8")[: len(given)] = given
     record[0]["d"]["wet_amount"] = 0.2  # a little rain or snow every day
-    return _namespace(record[0])
+    return namespace(record[0])
 
 
 @pytest.mark.parametrize("grid", SCHEMES.values(), ids=SCHEMES)
@@ -96,7 +96,7 @@ def test_the_annual_wave_decays_with_depth():
 def test_two_nodes_have_the_simulators_conductances(surface, swe):
     b = block()
     uncompiled(simulate_year)(b, 1, 1, np.zeros((0, 6, 1)), np.zeros((0, len(DAILY), 1)))
-    snow = swe / (b.w.snow_density[0] * b.w.snow_conductivity[0])
+    snow = swe * b.w.snow_resistance[0]
     steady = driven_by(np.full(DAYS, surface), snow=snow, organic=b.s.organic_depth[0])
     column = spun_up(SCHEMES["two nodes: the simulator's"], GROUND, steady)
     for _ in range(100):
