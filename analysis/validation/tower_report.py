@@ -47,7 +47,8 @@ LIKELY = {
         "net radiation": "snow's albedo, and the temperature of the ground's surface",
         "soil temperature": "no water that freezes in the organic layer: no zero curtain in autumn, no ice to melt in "
         "May, so the annual wave is too large",
-        "albedo": "crowns hide the snow at a low sun, and the snow on them changes no albedo; the thin snow of autumn is soon gone",
+        "albedo": "crowns hide the snow at a low sun, and the snow on them changes no albedo; the thin snow of "
+        "autumn is soon gone",
     },
 }
 #: Compared without a verdict, with the reason in the text.
