@@ -47,7 +47,10 @@ class Args:
 PARTS: dict[str, tuple[str, Callable[[Args], Part]]] = {
     "bands": ("Stands on sampled sites against observed ranges", lambda args: bands.report(args.sites)),
     "towers": ("Two towers, driven by their own weather", lambda args: tower_report.report(args.tower_repeats)),
-    "weather": ("The weather generator and its calibration", lambda args: weather_report.report(args.sites)),
+    "weather": (
+        "The weather generator and its calibration",
+        lambda args: weather_report.report(args.sites, args.tower_repeats),
+    ),
     "seasons": ("Seasonal courses of carbon and water", lambda args: seasonal_fluxes.report(args.sites)),
     "disturbance": ("Fire, insects and mortality", lambda args: disturbance_report.report(args.sites)),
 }

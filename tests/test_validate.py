@@ -8,7 +8,17 @@ import pytest
 from scripts import run_script
 
 from analysis import validate
-from analysis.validation import bands, calibration, climate_records, document, tower_comparison, weather_report
+from analysis.validation import (
+    bands,
+    calibration,
+    climate_records,
+    disturbance_report,
+    document,
+    held_stands,
+    tower_comparison,
+    tower_report,
+    weather_report,
+)
 from analysis.validation.held_stands import KINDS, hold
 from analysis.validation.scores import Band
 
@@ -83,6 +93,63 @@ def test_energy_closure_by_hand():
     fluxes = pd.DataFrame({**heats, **{f"{name}_measured": 1.0 for name in heats}}, index=index)
     fluxes.loc[index[1], ["latent_heat_w_m2", "latent_heat_w_m2_measured"]] = [500.0, 0.3]
     assert tower_comparison.energy_closure(fluxes) == pytest.approx(0.9)
+
+
+def test_evaporative_fraction_of_even_and_odd_days():
+    index = pd.date_range("2019-06-01", periods=4)
+    latent = pd.DataFrame({"measured": [1.0, 3.0, 1.0, 3.0], "modelled": 2.0, "counts": True}, index=index)
+    sensible = pd.DataFrame({"measured": 3.0, "modelled": [2.0, 6.0, 2.0, 6.0], "counts": True}, index=index)
+    compared = {"latent heat": latent, "sensible heat": sensible}
+    assert tower_comparison.summer_evaporative_fraction(compared, 0) == (0.5, 0.25)
+    assert tower_comparison.summer_evaporative_fraction(compared, 1) == (0.25, 0.5)
+
+
+def test_energy_offset_by_hand():
+    index = pd.date_range("2019-01-01", periods=2)
+    heats = {
+        "sensible_heat_w_m2": -20.0,
+        "latent_heat_w_m2": 5.0,
+        "net_radiation_w_m2": -10.0,
+        "ground_heat_w_m2": -7.0,
+    }
+    fluxes = pd.DataFrame({**heats, **{f"{name}_measured": 1.0 for name in heats}}, index=index)
+    fluxes.loc[index[1], "net_radiation_w_m2"] = np.nan
+    assert tower_comparison.energy_offset(fluxes) == (12.0, 1)
+
+
+def test_temperature_within_the_organic_layer():
+    """10 W/m2 through 0.11 m of 0.2 (thawed) or 0.4 W/m/K (frozen)."""
+    days = pd.DataFrame({
+        "soil_top_temperature_c": [2.0, -4.0], "ground_heat_mj_m2": [0.864, -0.864], "organic_layer_m": 0.30,
+        "ground_temperature_c": [12.0, -15.0], "surface_soil_temperature_c": [1.0, -3.0],
+    })  # fmt: skip
+    np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.19), [2.0 + 5.5, -4.0 - 2.75])
+
+
+def test_large_rmse_misses_without_bias_and_unjudged_has_no_verdict():
+    index = pd.date_range("2013-01-01", "2013-12-31")
+    measured = pd.Series(np.where(index.month < 7, 3.0, -3.0), index)
+    days = pd.DataFrame({"measured": measured, "modelled": 0.0, "counts": True})
+    found = tower_comparison.find_misses("here", {"soil temperature": days}, {})
+    assert len(found) == 1 and "RMSE 3.0" in found[0].what
+    assert tower_comparison.skill_table({"soil temperature": days}).endswith("| **MISS** |")
+    assert tower_comparison.skill_table({"soil temperature": days}, ("soil temperature",)).endswith("| none |")
+
+
+def test_digits_show_the_verdict():
+    assert Band(0.5, 1.5).digits(0.498, 2) == 3
+    assert Band(0.5, 1.5).digits(0.502, 2) == 2
+    assert Band(0.0975, 0.1625).digits(0.1629, 3) == 4
+
+
+def test_days_dry_and_warm_enough_for_fire():
+    """15 degC dries 3 mm a day from day 0: 30 mm are passed on the eleventh day; snow sets the index back."""
+    weather = {name: np.zeros((1, 1, 365)) for name in disturbance_report.DAILY}
+    weather["air_temperature_c"][:] = 15.0
+    weather["swe_mm"][0, 0, 150] = 1.0
+    site = {"summer_start_day": 150.0, "summer_end_day": 250.0, "fire_drought_threshold": 30.0}
+    warm, ready = disturbance_report.fire_days(held_stands.Run({}, {}, weather), [site])
+    assert (warm[0], ready[0]) == (100.0, 100.0 - 11.0)
 
 
 def test_statistics_of_a_made_up_year():

@@ -23,7 +23,7 @@ def report(sites: int) -> Part:
     for name, check in CHECKS.items():
         cells = [_cell(check, kind, values[name]) for kind in ALL]
         unit = "" if check.unit == "1" else f" [{check.unit}]"
-        rows.append([f"{name}{unit}", _limits(check), *cells, check.source])
+        rows.append([f"{name}{unit}", _limits(check, values[name]), *cells, check.source])
         for kind in check.bands:
             misses += _miss(name, check, kind, values[name][kind])
     pair_rows, pair_misses = _pairs(runs)
@@ -56,19 +56,25 @@ def run_all(sites: int) -> dict[str, Run]:
     return runs
 
 
-def _limits(check: Check) -> str:
+def _limits(check: Check, samples: dict[str, np.ndarray]) -> str:
     """The band, or one for each kind of stand where they differ."""
-    texts = {kind: f"{number(band.low, check.digits)} .. {number(band.high, check.digits)}"
-             for kind, band in check.bands.items()}  # fmt: skip
+    digits = max(_digits(check, kind, samples[kind]) for kind in check.bands)
+    texts = {kind: f"{number(band.low, digits)} .. {number(band.high, digits)}" for kind, band in check.bands.items()}
     if len(set(texts.values())) == 1:
         return next(iter(texts.values()))
     return "; ".join(f"{SHORT[kind]} {text}" for kind, text in texts.items())
 
 
+def _digits(check: Check, kind: str, sample: np.ndarray) -> int:
+    """Digits of a kind's values with which the verdict is seen."""
+    return check.bands[kind].digits(float(np.median(sample)), check.digits) if kind in check.bands else check.digits
+
+
 def _cell(check: Check, kind: str, samples: dict[str, np.ndarray]) -> str:
     if kind not in samples:
         return "-"
-    low, median, high = (number(value, check.digits) for value in np.percentile(samples[kind], [10, 50, 90]))
+    digits = _digits(check, kind, samples[kind])
+    low, median, high = (number(value, digits) for value in np.percentile(samples[kind], [10, 50, 90]))
     text = f"{median} ({low} .. {high})"
     return f"{text} {_verdict(check.bands[kind], samples[kind])}" if kind in check.bands else text
 
@@ -83,9 +89,10 @@ def _miss(name: str, check: Check, kind: str, sample: np.ndarray) -> list[Miss]:
     verdict = band.verdict(median)
     if verdict == IN:
         return []
-    limits = f"{number(band.low, check.digits)} .. {number(band.high, check.digits)}"
+    digits = _digits(check, kind, sample)
+    limits = f"{number(band.low, digits)} .. {number(band.high, digits)}"
     likely = check.low if "low" in verdict else check.high
-    return [Miss(kind, f"{name}: median {number(median, check.digits)}, band {limits}", likely)]
+    return [Miss(kind, f"{name}: median {number(median, digits)}, band {limits}", likely)]
 
 
 def _pairs(runs: dict[str, Run]) -> tuple[list[list[str]], list[Miss]]:
@@ -94,7 +101,7 @@ def _pairs(runs: dict[str, Run]) -> tuple[list[list[str]], list[Miss]]:
     rows, misses = [], []
     for label, kind in (("organic layer as it was", FELLED), ("organic layer of open ground", "open")):
         sample = WARMING.value(runs[kind]) - forest
-        rows.append([label, _cell(WARMING, FELLED, {FELLED: sample}), _limits(WARMING)])
+        rows.append([label, _cell(WARMING, FELLED, {FELLED: sample}), _limits(WARMING, {FELLED: sample})])
         misses += _miss(f"warming of the surface soil [K], {label}", WARMING, FELLED, sample)
     return rows, misses
 

@@ -4,10 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.validation import document
-from analysis.validation.document import Miss, Part, number
+import sim
+from analysis.validation import climate_records, document
+from analysis.validation.document import Miss, Part, number, percent
 from analysis.validation.held_stands import KINDS, Run, hold
 from analysis.validation.scores import IN, Band, poisson_interval
+from sim.parameters import CONSTANTS
+from sim.state import DAYS
+from sim.weather import drought_index
 
 YEARS = 50
 MORTALITY_YEARS = 4
@@ -17,6 +21,8 @@ KINDS_SHOWN = {
 }
 JUDGED = ("mature conifer", "mature mixed")
 UNDISTURBED = {"fire": False, "insects": False}
+DAILY = ("air_temperature_c", "precipitation_mm", "swe_mm")
+drought_index_of = np.vectorize(climate_records.uncompiled(drought_index))
 #: Densities [stems ha-1] at which mortality is measured, by species; at the first no stand thins itself.
 DENSITIES = (800.0, 1500.0, 2000.0)
 
@@ -37,7 +43,7 @@ SOURCES = {
     "mortality": "FVS-Alaska: spruce 0.3-0.5, birch 0.7-4.4, aspen 0.9-8.7; CLM6 1.7-2.4; LPJmL 1.5",
 }
 LIKELY = {
-    "fire return": "the hazard grows with cover, and a closed canopy has all of it; few rain days make long droughts",
+    "fire return": "the hazard grows with cover, and a closed canopy has all of it; most warm days are dry enough",
     "share of stems killed": "draw of the share",
     "carbon burned": "depth and density of the organic layer that burns",
     "outbreaks": "winters below the temperature at which insects live",
@@ -79,17 +85,28 @@ def mortality(run: Run) -> np.ndarray:
 
 def report(sites: int) -> Part:
     """Fire and insects over many stand-years, mortality by density; tables and what misses."""
-    runs = {kind: hold(stocks, sites, YEARS) for kind, stocks in KINDS_SHOWN.items()}
+    runs = {kind: hold(stocks, sites, YEARS, keep_daily=DAILY) for kind, stocks in KINDS_SHOWN.items()}
     fire_rows, fire_misses = _fire(runs)
     insect_rows, insect_misses = _insects(runs)
     mortality_rows, mortality_misses = _mortality(sites)
     years = sites * YEARS
     mortality_header = ["mortality [% yr-1]", "stems/ha", "median (10-90 %)", "literature", "verdict", "source"]
+    warm, ready = fire_days(runs["mature conifer"], [sim.sample_site(k) for k in range(sites)])
+    dry = _dry_sites(runs["mature conifer"])
+    shares = [percent(float(ready[half].sum() / warm[half].sum())) for half in (dry, ~dry)]
+    warm_days, days = (
+        [number(float(count[half].mean()) / YEARS, 0) for half in (dry, ~dry)] for count in (warm, ready)
+    )
     text = f"""Stands held as in part 1, with fire and insects, {sites} sites for {YEARS} years: {years} stand-years of
 each kind, the last as an episode of the environment starts. Intervals are 95 % (Poisson). Dry and wet sites are the
 halves by annual precipitation.
 
 {document.table(["fire", "stand", "value", "literature", "verdict", "source"], fire_rows, left=6)}
+
+The return does not follow the sites' wetness. Mature conifers at dry sites have {days[0]} summer days a year that are
+warm (above {CONSTANTS["fire_temperature_c"].low:g} degC) and beyond the drought threshold, those at wet ones {days[1]}:
+{shares[0]} and {shares[1]} of their {warm_days[0]} and {warm_days[1]} warm days. Rain falls on few days, in amounts
+that empty the index at once, and between them it soon fills again.
 
 {document.table(["insects", "stand", "value", "literature", "verdict", "source"], insect_rows, left=6)}
 
@@ -102,18 +119,41 @@ of 1500-2000 stems/ha fits large trees only.
     return Part(text, misses=[*fire_misses, *insect_misses, *mortality_misses])
 
 
+def fire_days(run: Run, parameters: list[dict[str, float]]) -> tuple[np.ndarray, np.ndarray]:
+    """Days of each site, (sites,), on which summer is warm enough for fire, and on which it is dry enough as well."""
+    columns = [np.array([site[name] for site in parameters]) for name in
+               ("summer_start_day", "summer_end_day", "fire_drought_threshold")]  # fmt: skip
+    start, end, threshold = columns
+    drying, warmth = CONSTANTS["drought_evaporation"].low, CONSTANTS["fire_temperature_c"].low
+    warm, ready, index = np.zeros(len(start)), np.zeros(len(start)), np.zeros(len(start))
+    weather = [run.daily[name] for name in DAILY]
+    for year in range(weather[0].shape[0]):
+        for day in range(DAYS):
+            temperature, rain, snow = (values[year, :, day] for values in weather)
+            index = drought_index_of(index, temperature, rain, snow, drying)
+            summer = (start <= day + 1) & (day + 1 < end) & (temperature > warmth)
+            warm += summer
+            ready += summer & (index > threshold)
+    return warm, ready
+
+
+def _dry_sites(run: Run) -> np.ndarray:
+    """Which sites are of the half with less precipitation."""
+    rain = run.sites("precipitation_mm")
+    return rain <= np.median(rain)
+
+
 def _fire(runs: dict[str, Run]) -> tuple[list[list[str]], list[Miss]]:
     rows, misses = [], []
     for kind, run in runs.items():
-        rain = run.sites("precipitation_mm")
-        dry = rain <= np.median(rain)
+        dry = _dry_sites(run)
         judged = FIRE_RETURN if kind in JUDGED else None
         for label, sites in (("", slice(None)), (", dry sites", dry), (", wet sites", ~dry)):
             fires = Fires.of(run, sites)
-            value = f"{number(fires.interval, 0)} ({number(fires.low, 0)} .. {number(fires.high, 0)})"
+            spread = f" ({number(fires.low, 0)} .. {number(fires.high, 0)})"
             band = judged if not label else None
             name = f"return interval{label} [yr]"
-            rows.append(_row(name, kind, value, fires.interval, band, "fire return", misses, 0))
+            rows.append(_row(name, kind, fires.interval, spread, band, "fire return", misses, 0))
         fires = Fires.of(run)
         if not fires.number:
             continue
@@ -122,7 +162,7 @@ def _fire(runs: dict[str, Run]) -> tuple[list[list[str]], list[Miss]]:
             ("share of stems killed", fires.killed, KILLED if grown else None, "share of stems killed", 2),
             ("carbon burned [kgC m-2]", fires.burned, BURNED if grown else None, "carbon burned", 1),
         ):
-            rows.append(_row(name, kind, number(value, digits), value, band, source, misses, digits))
+            rows.append(_row(name, kind, value, "", band, source, misses, digits))
     return rows, misses
 
 
@@ -131,13 +171,12 @@ def _insects(runs: dict[str, Run]) -> tuple[list[list[str]], list[Miss]]:
     for kind, run in runs.items():
         killed = run.annual["insect_mortality"]
         outbreaks = 100.0 * float((killed > 0.0).mean())
-        text = number(outbreaks, 1)
         band = OUTBREAKS if kind in KINDS else None
-        rows.append(_row("outbreaks a century", kind, text, outbreaks, band, "outbreaks", misses, 1))
+        rows.append(_row("outbreaks a century", kind, outbreaks, "", band, "outbreaks", misses, 1))
     killed = runs["mature conifer"].annual["insect_mortality"]
     if (killed > 0.0).any():
         share, name = float(killed[killed > 0.0].mean()), "share of conifers killed"
-        rows.append(_row(name, "mature conifer", number(share), share, INSECT_KILL, name, misses, 2))
+        rows.append(_row(name, "mature conifer", share, "", INSECT_KILL, name, misses, 2))
     return rows, misses
 
 
@@ -148,19 +187,22 @@ def _mortality(sites: int) -> tuple[list[list[str]], list[Miss]]:
             stocks = {**KINDS[f"mature {species}"], f"{species}_mature_stems_ha": density}
             sample = mortality(hold(stocks, sites, MORTALITY_YEARS, mechanisms=UNDISTURBED))
             low, median, high = np.percentile(sample, [10, 50, 90])
-            value = f"{number(median)} ({number(low)} .. {number(high)})"
+            spread = f" ({number(low)} .. {number(high)})"
             judged = band if density == DENSITIES[0] else None
-            row = _row(species, number(density, 0), value, float(median), judged, "mortality", misses, 2)
+            row = _row(species, number(density, 0), float(median), spread, judged, "mortality", misses, 2)
             rows.append(row)
     return rows, misses
 
 
-def _row(name, kind, text, value: float, band: Band | None, source: str, misses: list[Miss], digits: int) -> list[str]:
-    """A row of a table; a miss is added to `misses`."""
+def _row(
+    name, kind, value: float, spread: str, band: Band | None, source: str, misses: list[Miss], digits: int
+) -> list[str]:
+    """A row of a table, `spread` behind the value; a miss is added to `misses`."""
     if band is None:
-        return [name, kind, text, "", "", ""]
-    verdict = band.verdict(value)
+        return [name, kind, number(value, digits) + spread, "", "", ""]
+    digits, verdict = band.digits(value, digits), band.verdict(value)
     limits = f"{number(band.low, digits)} .. {number(band.high, digits)}"
     if verdict != IN:
         misses.append(Miss(kind, f"{name}: {number(value, digits)}, literature {limits}", LIKELY[source]))
+    text = number(value, digits) + spread
     return [name, kind, text, limits, verdict if verdict == IN else f"**{verdict}**", SOURCES[source]]

@@ -139,8 +139,8 @@ CHECKS = {
         "US-Prr and SE-Svb 1.0; but 1.0-2.2 over larch (Kelliher et al. 1997), "
         "1.5 by day over spruce (Betts et al. 1999)",
         "transpiration",
-        "Priestley-Taylor coefficient (part 3) with stress factors on top; little heat into the ground in summer; "
-        "no understorey, no wet moss",
+        "dry soil (the paper's few rain days) and cold nights stress transpiration, in colder summers equilibrium "
+        "evaporation is smaller; little heat into the ground; no understorey, no wet moss",
     ),
     "interception loss of snowfall": Check(
         "1", interception_loss, _for(MATURE, 0.13, 0.40), "Pomeroy et al. 1998: aspen 0.13, conifers 0.3-0.4; "

@@ -1,5 +1,6 @@
 """How well two series agree, and whether a value lies in an observed band."""
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -27,6 +28,13 @@ class Band:
         if value < self.low:
             return "MISS, low"
         return "MISS, high" if value > self.high else IN
+
+    def digits(self, value: float, fewest: int) -> int:
+        """Digits, at least `fewest`, with which value and band have to be printed for the verdict to be seen."""
+        for digits in itertools.count(fewest):
+            printed = Band(round(self.low, digits), round(self.high, digits))
+            if printed.verdict(round(value, digits)) == self.verdict(value):
+                return digits
 
     def share_within(self, values: np.ndarray) -> float:
         """Share of values in the band."""

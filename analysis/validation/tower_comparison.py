@@ -5,6 +5,7 @@ in gC m-2 day-1, heat in W m-2, temperature in degC.
 """
 
 import calendar
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,8 @@ DAYS_OF_SNOW_OFF = 7.0
 @dataclass(frozen=True)
 class Quantity:
     """What is compared: unit, column measured, columns modelled (their sum, less those of `less`) and their factor, and
-    the bias that counts as a miss, in the unit or as a share of the measured months' mean magnitude."""
+    the bias that counts as a miss, in the unit or as a share of the measured months' mean magnitude. Where
+    `largest_rmse` is given, so does a larger RMSE of the months."""
 
     unit: str
     measured: str
@@ -38,6 +40,7 @@ class Quantity:
     relative: bool = True
     digits: int = 1
     less: tuple[str, ...] = ()
+    largest_rmse: float = math.inf
 
 
 RESPIRATION = ("autotrophic_respiration_kgc_m2", "heterotrophic_respiration_kgc_m2")
@@ -54,7 +57,7 @@ QUANTITIES = {
     "net radiation": Quantity("W m-2", "net_radiation_w_m2", ("net_radiation_mj_m2",), 1.0 / MJ_PER_DAY),
     "ground heat": Quantity("W m-2", "ground_heat_w_m2", ("ground_heat_mj_m2",), 1.0 / MJ_PER_DAY),
     "soil temperature": Quantity(
-        "degC", "soil_temperature_c", ("soil_top_temperature_c",), tolerance=1.0, relative=False
+        "degC", "soil_temperature_c", ("soil_top_temperature_c",), tolerance=1.0, relative=False, largest_rmse=2.0
     ),
     "albedo": Quantity("1", "albedo", ("albedo",), tolerance=0.03, relative=False, digits=3),
 }  # fmt: skip
@@ -102,14 +105,16 @@ def climatology(days: pd.DataFrame) -> pd.DataFrame:
 
 
 def misses(name: str, days: pd.DataFrame) -> bool:
-    """Whether the bias of the months is beyond the quantity's tolerance."""
+    """Whether bias or RMSE of the months is beyond the quantity's tolerance."""
     q, months = QUANTITIES[name], by_month(days)
     scale = months["measured"].dropna().abs().mean() if q.relative else 1.0
-    return abs(scores(days)[0].bias) > q.tolerance * scale
+    agreement = scores(days)[0]
+    return abs(agreement.bias) > q.tolerance * scale or agreement.rmse > q.largest_rmse
 
 
-def skill_table(compared: dict[str, pd.DataFrame]) -> str:
-    """Markdown: bias, RMSE and correlation of months and days, the worst calendar month, the verdict."""
+def skill_table(compared: dict[str, pd.DataFrame], unjudged: tuple[str, ...] = ()) -> str:
+    """Markdown: bias, RMSE and correlation of months and days, the worst calendar month, the verdict if there is
+    one."""
     rows = []
     for name, days in compared.items():
         q, (months, single) = QUANTITIES[name], scores(days)
@@ -120,7 +125,8 @@ def skill_table(compared: dict[str, pd.DataFrame]) -> str:
         for s in (months, single):
             cells += [number(s.bias, q.digits, sign=True), number(s.rmse, q.digits), number(s.r, 2), str(s.pairs)]
         cells += [f"{calendar.month_abbr[worst]} {number(gap, q.digits, sign=True)}"]
-        rows.append([*cells, "**MISS**" if misses(name, days) else "in"])
+        verdict = "**MISS**" if misses(name, days) else "in"
+        rows.append([*cells, "none" if name in unjudged else verdict])
     header = [
         "",
         "measured",
@@ -149,31 +155,50 @@ def course_table(compared: dict[str, pd.DataFrame]) -> str:
 
 
 def find_misses(site: str, compared: dict[str, pd.DataFrame], likely: dict[str, str]) -> list[Miss]:
-    """Every quantity whose bias misses, with the likely process."""
+    """Every quantity whose bias or RMSE misses, with the likely process."""
     found = []
     for name, days in compared.items():
         if misses(name, days):
             q, months = QUANTITIES[name], by_month(days)
-            bias = number(scores(days)[0].bias, q.digits, sign=True)
+            agreement = scores(days)[0]
             unit = "" if q.unit == "1" else f" {q.unit}"
-            what = f"{name}: bias of months {bias}{unit}, measured {number(months['measured'].mean(), q.digits)}"
+            what = f"{name}: bias of months {number(agreement.bias, q.digits, sign=True)}{unit}"
+            what += f", RMSE {number(agreement.rmse, q.digits)}" if math.isfinite(q.largest_rmse) else ""
+            what += f", measured {number(months['measured'].mean(), q.digits)}"
             found.append(Miss(site, what, likely.get(name, "not known")))
     return found
 
 
 def energy_closure(fluxes: pd.DataFrame, months: tuple[int, ...] = tuple(range(1, 13))) -> float:
     """(H + LE) / (Rn - G) over days of these months on which all four were measured."""
+    turbulent, available = _balance(fluxes[fluxes.index.month.isin(months)])
+    return turbulent.sum() / available.sum()
+
+
+def energy_offset(fluxes: pd.DataFrame) -> tuple[float, int]:
+    """Mean of Rn - G - H - LE [W m-2] over the days on which all four were measured, and their number."""
+    turbulent, available = _balance(fluxes)
+    return (available - turbulent).mean(), len(available)
+
+
+def _balance(fluxes: pd.DataFrame) -> tuple[pd.Series, pd.Series]:
+    """H + LE and Rn - G of the days on which all four were measured."""
     names = ("sensible_heat_w_m2", "latent_heat_w_m2", "net_radiation_w_m2", "ground_heat_w_m2")
     complete = (fluxes[[f"{name}_measured" for name in names]] >= MEASURED_SHARE).all(axis=1)
-    complete &= fluxes.index.month.isin(months) & fluxes[list(names)].notna().all(axis=1)
-    h, le, rn, g = (fluxes.loc[complete, name].sum() for name in names)
-    return (h + le) / (rn - g)
+    complete &= fluxes[list(names)].notna().all(axis=1)
+    h, le, rn, g = (fluxes.loc[complete, name] for name in names)
+    return h + le, rn - g
 
 
-def summer_evaporative_fraction(compared: dict[str, pd.DataFrame]) -> tuple[float, float]:
-    """LE / (LE + H) of June to August, measured and modelled: a ratio that does not depend on closure."""
+def summer_evaporative_fraction(compared: dict[str, pd.DataFrame], parity: int | None = None) -> tuple[float, float]:
+    """LE / (LE + H) of June to August, measured and modelled: a ratio that does not depend on closure.
+
+    parity : 0 for the even days of the months alone, 1 for the odd ones.
+    """
     latent, sensible = compared["latent heat"], compared["sensible heat"]
     summer = latent["counts"] & sensible["counts"] & latent.index.month.isin([6, 7, 8])
+    if parity is not None:
+        summer &= latent.index.day % 2 == parity
     latent, sensible = (days.loc[summer, ["measured", "modelled"]].sum() for days in (latent, sensible))
     fraction = latent / (latent + sensible)
     return fraction["measured"], fraction["modelled"]

@@ -38,7 +38,7 @@ def draw(title: str, compared: dict[str, pd.DataFrame], swe: pd.Series, soil_lab
 
     ax, days = axes[-1], compared["soil temperature"]
     ax.plot(days.index, days["measured"].where(days["counts"]), color=BLACK, lw=1.2, label=soil_label)
-    ax.plot(days.index, days["modelled"], color=ORANGE, lw=1.2, label="modelled, surface soil")
+    ax.plot(days.index, days["modelled"], color=ORANGE, lw=1.2, label="modelled")
     ax.set_title("soil temperature, and the modelled snow")
     ax.set_ylabel("°C")
     ax.legend(loc="upper left", ncols=2)

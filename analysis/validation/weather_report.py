@@ -107,8 +107,11 @@ def snowfall(climate: Climate) -> float:
     return float((snow.to_numpy() * DAYS_OF_MONTH).sum())
 
 
-def report(sites: int) -> Part:
-    """The generator on `sites` sampled sites and in US-Prr's climate against the records; calibration by halves."""
+def report(sites: int, repeats: int) -> Part:
+    """The generator on `sites` sampled sites and in US-Prr's climate against the records; calibration by halves.
+
+    repeats : times that a tower's year is run, as of `calibration.evaporative_fractions`.
+    """
     sampled = hold(KINDS["open"], sites, YEARS, mechanisms=UNDISTURBED, keep_daily=DAILY)
     alike = hold(
         KINDS["open"], sites, YEARS, mechanisms=UNDISTURBED, keep_daily=DAILY, site_overrides=US_PRR_CLIMATE
@@ -123,7 +126,7 @@ def report(sites: int) -> Part:
     share = {season: float(np.median(values)) for season, values in by_season(here["wet days"]).items()}
     winter = [month - 1 for month in calibration.WINTER_HALF]
     unscaled = here["precipitation"][:, winter].mean() / CONSTANTS["snowfall_scale"].low
-    calibrated, more = calibration.report(share, unscaled)
+    calibrated, more = calibration.report(share, unscaled, repeats)
     header = ["", "season", "generator, sampled sites", "generator, US-Prr's climate", "ERA-Interim 1989-2014",
               "US-Prr 2011-14", "forest towers", "verdict"]  # fmt: skip
     text = f"""Weather of {YEARS} years on {sites} sampled sites (median, 10-90 %), and on the same sites with latitude,
