@@ -776,7 +776,7 @@ def _spread(name, value, number) -> list:
 
 #: Carbon scale [kgC m-2 yr-1] at which both returns vary equally between policies of one site, as measured by
 #: `analysis/measure_balance.py`.
-BALANCED_CARBON_SCALE = 2.3
+BALANCED_CARBON_SCALE = 1.4
 
 for _name, _kwargs in {
     "boreal-generalist-v0": {"mode": "generalist"},
