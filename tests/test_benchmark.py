@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scripts import run_script
 
 from analysis import benchmark, profile_kernel
 from analysis.machine import machine
 from analysis.protocol import TIMING_COLUMNS
 from sim import step
-from tests.scripts import run_script
 
 FIGURES = {
     "episode": {"s"},

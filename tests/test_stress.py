@@ -3,13 +3,13 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scripts import run_script
 
 import sim
 from analysis import stress
 from sim.closure import TOLERANCES
 from sim.parameters import check_constants
 from sim.state import RECORD_NAMES, STATE_NAMES
-from tests.scripts import run_script
 
 CORNERS = list(stress.GROUPS).index("sampled corners")  # a batch of this group is soon done
 
