@@ -80,7 +80,7 @@ YEARLY_BUDGETS = {
 
 #: Largest difference of a day's mean temperature from the air's [K]: (sites in the sampled ranges, all others).
 #: Half as much again as was seen: a guard against a node that runs away, not a statement on nature.
-FARTHEST_FROM_AIR = {"canopy_temperature_c": (20.0, 120.0), "ground_temperature_c": (20.0, 120.0)}
+FARTHEST_FROM_AIR = {"canopy_temperature_c": (20.0, 190.0), "ground_temperature_c": (20.0, 120.0)}
 #: Range of the soil's daily means [degC], likewise.
 SOIL_TEMPERATURES = ((-50.0, 40.0), (-120.0, 120.0))
 
