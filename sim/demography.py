@@ -2,7 +2,7 @@
 
 Stems are real numbers per hectare in arrays (AGES, lanes); the last row pools all beyond 100 years.
 """
-from sim.jit import compiled
+from sim.jit import compiled, phase
 from sim.mathematics import exponential
 
 AGES = 102
@@ -47,6 +47,26 @@ def remove_share(stems, lane, youngest, oldest, share):
     """Remove a share of the stems of an age range, in place."""
     for age in range(youngest, oldest + 1):
         stems[age, lane] -= share * stems[age, lane]
+
+
+@phase
+def kill(b, i, conifers, deciduous):
+    """Let shares of a lane's conifers and deciduous trees, of all ages alike, die; their carbon goes to the soil.
+
+    Returns the stems that died [ha-1], which are booked.
+    """
+    s, w, r = b.s, b.w, b.r
+    killed = conifers * count(s.conifer_stems, i, 0, OLDEST) + deciduous * count(s.deciduous_stems, i, 0, OLDEST)
+    remove_share(s.conifer_stems, i, 0, OLDEST, conifers)
+    remove_share(s.deciduous_stems, i, 0, OLDEST, deciduous)
+    dead_conifers = conifers * s.conifer_biomass[i]
+    dead_deciduous = deciduous * s.deciduous_biomass[i]
+    s.conifer_biomass[i] -= dead_conifers
+    s.deciduous_biomass[i] -= dead_deciduous
+    s.soil_carbon[i] += dead_conifers + dead_deciduous
+    w.stems_gain[i] -= killed
+    r.mortality_kgc_m2[i] += dead_conifers + dead_deciduous
+    return killed
 
 
 @compiled

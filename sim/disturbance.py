@@ -1,5 +1,5 @@
 """Fire and insects: their hazards, and what they do to a stand. Their dice are drawn before the year begins."""
-from sim.demography import OLDEST, count, remove_share
+from sim.demography import OLDEST, count, kill, remove_share
 from sim.jit import compiled, phase
 from sim.structure import crown_areas
 from sim.weather import drought_index
@@ -69,27 +69,14 @@ def fire(b, day, i):
 def insects(b, i):
     """An outbreak, if dice, the past winter and density agree; the dead go to the soil."""
     s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
-    conifers = count(s.conifer_stems, i, 0, OLDEST)
-    deciduous = count(s.deciduous_stems, i, 0, OLDEST)
-    density = conifers + deciduous
+    density = count(s.conifer_stems, i, 0, OLDEST) + count(s.deciduous_stems, i, 0, OLDEST)
     winter = w.winter_air[i] / w.winter_days[i] if w.winter_days[i] > 0.0 else 0.0
     probability = outbreak_probability(
         p.insect_base_probability[i], winter, density, p.insect_lethal_c[i], p.insect_mild_c[i], p.insect_density[i]
     )
     if not (p.insects[i] > 0.0 and d.insect_dice[i] < probability):
         return
-    dies_conifer = p.insect_mortality_rate[i]
-    dies_deciduous = dies_conifer * p.insect_deciduous[i]
-    remove_share(s.conifer_stems, i, 0, OLDEST, dies_conifer)
-    remove_share(s.deciduous_stems, i, 0, OLDEST, dies_deciduous)
-    dead_conifer = dies_conifer * s.conifer_biomass[i]
-    dead_deciduous = dies_deciduous * s.deciduous_biomass[i]
-    s.conifer_biomass[i] -= dead_conifer
-    s.deciduous_biomass[i] -= dead_deciduous
-    s.soil_carbon[i] += dead_conifer + dead_deciduous
-    killed = dies_conifer * conifers + dies_deciduous * deciduous
-    w.stems_gain[i] -= killed
-    r.mortality_kgc_m2[i] += dead_conifer + dead_deciduous
+    killed = kill(b, i, p.insect_mortality_rate[i], p.insect_deciduous[i] * p.insect_mortality_rate[i])
     r.insect_mortality[i] = killed / density if density > 0.0 else 0.0
 
 

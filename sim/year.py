@@ -8,7 +8,7 @@ from sim.account import clear_year, write_record
 from sim.canopy import aerodynamic_conductance
 from sim.carbon import SECONDS_PER_YEAR, maintenance_rates
 from sim.day import begin_day, end_day
-from sim.demography import OLDEST, count, grow_older, recruits, remove_share, self_thinning
+from sim.demography import OLDEST, count, grow_older, kill, recruits, self_thinning
 from sim.disturbance import between, disturb
 from sim.jit import phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
@@ -183,10 +183,9 @@ def end_year(b):
 @phase
 def renew_stems(b, i):
     """Background mortality and self-thinning, recruitment, ageing."""
-    s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
+    s, p, w, d = b.s, b.p, b.w, b.d
     conifers = count(s.conifer_stems, i, 0, OLDEST)
-    deciduous = count(s.deciduous_stems, i, 0, OLDEST)
-    density = conifers + deciduous
+    density = conifers + count(s.deciduous_stems, i, 0, OLDEST)
 
     background = p.natural_mortality[i] * between(
         1.0 - p.mortality_spread[i], 1.0 + p.mortality_spread[i], d.mortality_dice[i]
@@ -194,22 +193,15 @@ def renew_stems(b, i):
     crowding = self_thinning(
         density, p.max_natural_density[i], p.density_mortality_threshold[i], p.density_dependent_mortality[i]
     )
-    dies_conifer = min(background * p.mortality_conifer[i] + crowding, 1.0)
-    dies_deciduous = min(background * p.mortality_deciduous[i] + crowding, 1.0)
-    remove_share(s.conifer_stems, i, 0, OLDEST, dies_conifer)
-    remove_share(s.deciduous_stems, i, 0, OLDEST, dies_deciduous)
-    dead_conifer = dies_conifer * s.conifer_biomass[i]
-    dead_deciduous = dies_deciduous * s.deciduous_biomass[i]
-    s.conifer_biomass[i] -= dead_conifer
-    s.deciduous_biomass[i] -= dead_deciduous
-    s.soil_carbon[i] += dead_conifer + dead_deciduous
-    r.mortality_kgc_m2[i] += dead_conifer + dead_deciduous
+    conifers_die = min(background * p.mortality_conifer[i] + crowding, 1.0)
+    deciduous_die = min(background * p.mortality_deciduous[i] + crowding, 1.0)
+    kill(b, i, conifers_die, deciduous_die)
 
     new = recruits(density, p.max_natural_density[i], p.recruitment_rate[i])
     seed_source = conifers / density if density > 0.0 else 0.5
     s.conifer_stems[0, i] += new * seed_source
     s.deciduous_stems[0, i] += new * (1.0 - seed_source)
-    w.stems_gain[i] += new - dies_conifer * conifers - dies_deciduous * deciduous
+    w.stems_gain[i] += new
     grow_older(s.conifer_stems, i)
     grow_older(s.deciduous_stems, i)
 
