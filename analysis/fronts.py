@@ -191,7 +191,7 @@ def main(args: Args) -> None:
     budget = QUICK if args.quick else SMALL if args.without_mechanisms else FULL
     folder, todo = folder_of(args), cases(args)
     settings = {"budget": budget._asdict(), "seed": args.seed, "years": YEARS, "block_years": BLOCK_YEARS,
-                "columns": RETURNS + STAND, "source": stored.source_hash()}  # fmt: skip
+                "columns": RETURNS + STAND, "physics": open_loop.fingerprint()}  # fmt: skip
     finished = {case: stored.is_finished(path_of(folder, *case), settings | {"case": case}) for case in todo}
     print(f"{sum(finished.values())} of {len(todo)} fronts are there, in {folder}", flush=True)
     each = most_episodes(budget)

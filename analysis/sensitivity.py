@@ -296,7 +296,7 @@ def main(args: Args) -> None:
         return
 
     settings = {"sites": site_seeds, "weathers": WEATHERS, "years": YEARS, "share": SHARE,
-                "source": stored.source_hash()}  # fmt: skip
+                "physics": open_loop.fingerprint()}  # fmt: skip
     groups: dict[str, list[Variant]] = {}
     for variant in everything:
         groups.setdefault(variant.group, []).append(variant)

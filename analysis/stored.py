@@ -1,22 +1,11 @@
 """Tables on disk that know what made them, so that a study that was stopped goes on where it stopped."""
 
-import hashlib
 import json
 from pathlib import Path
 
 import pandas as pd
 
 from analysis.protocol import FLOAT_FORMAT, replacing
-
-ROOT = Path(__file__).parents[1]
-
-
-def source_hash() -> str:
-    """Hash of all that an episode's numbers depend on: the simulator, its tables, the reward."""
-    digest = hashlib.sha256()
-    for path in [*sorted(ROOT.glob("sim/*.py")), *sorted(ROOT.glob("sim/*.csv")), ROOT / "boreal_env.py"]:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def write(path: Path, table: pd.DataFrame, settings: dict) -> None:
