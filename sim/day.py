@@ -66,7 +66,9 @@ def canopy_structure(b, day):
             1.0 - exponential(-w.optical_deciduous[i] * thinner)
         )
         w.snow_efficiency[i] = caught * p.interception[i]
-        w.rain_capacity[i] = p.rain_capacity_mm[i] * w.snow_area[i] * p.interception[i]
+        capacity = p.rain_capacity_mm[i] * w.snow_area[i] * p.interception[i]
+        w.rain_capacity[i] = capacity
+        w.per_rain_capacity[i] = 1.0 / capacity if capacity > 0.0 else 0.0
 
         crowns = w.cover_conifer[i] + w.cover_deciduous[i]
         w.trunk_air[i] = p.trunk_air_conductance[i] * p.woody_area_index[i] * crowns
@@ -74,12 +76,14 @@ def canopy_structure(b, day):
         w.trunk_ground[i] = p.trunk_ground_conductance[i] * crowns
         w.snow_density[i] = bulk_density(crowns, p.snow_density_sheltered[i], p.snow_density_open[i])
         w.snow_resistance[i] = 1.0 / (w.snow_density[i] * conductivity(w.snow_density[i]))
+        w.snow_hiding[i] = 1.0 / (w.snow_density[i] * p.snow_cover_depth_m[i])
         w.temperature_stress_conifer[i] = stress_ramp(
-            w.minimum_temperature[i], p.tmin_low_conifer[i], p.tmin_high_conifer[i]
+            w.minimum_temperature[i], p.tmin_low_conifer[i], 1.0 / (p.tmin_high_conifer[i] - p.tmin_low_conifer[i])
         )
         w.temperature_stress_deciduous[i] = stress_ramp(
-            w.minimum_temperature[i], p.tmin_low_deciduous[i], p.tmin_high_deciduous[i]
-        )
+            w.minimum_temperature[i], p.tmin_low_deciduous[i],
+            1.0 / (p.tmin_high_deciduous[i] - p.tmin_low_deciduous[i]),
+        )  # fmt: skip
         wind_exchange(b, i, p.wind_speed_m_s[i])
         w.vapour_density[i] = w.air_density[i] * 0.622 / p.air_pressure_hpa[i]
 

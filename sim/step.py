@@ -11,7 +11,7 @@ from sim.snow import ICE_HEAT_CAPACITY, LATENT_HEAT_FUSION
 from sim.solve import conductances, solve_canopy
 from sim.transfer import move_carbon, move_energy_and_water
 from sim.water import water_stress
-from sim.weather import FREEZING_POINT_K, saturation_pressure, saturation_pressure_water, snow_share
+from sim.weather import FREEZING_POINT_K, saturation_pressure, saturation_pressure_water, saturation_slope, snow_share
 
 
 @phase
@@ -72,6 +72,7 @@ def stores_before(b, seconds):
     s, p, w = b.s, b.p, b.w
     for i in range(len(s.swe)):
         w.saturation[i] = saturation_pressure(w.air[i])
+        w.saturation_slope[i] = saturation_slope(w.air[i], w.saturation[i])
         # The vapour of the day's mean is more than a cold night's air can hold: the rest is dew and fog, not followed.
         w.humidity[i] = min(w.vapour[i], w.saturation[i])
         w.deficit[i] = w.saturation[i] - w.humidity[i]
@@ -105,7 +106,7 @@ def balance(b, seconds):
             - LATENT_HEAT_FUSION * ice
         )
         water = ice + s.canopy_rain[i] + s.soil_water[i]
-        energy_failure = abs(energy - w.energy_before[i] - w.energy_gain[i]) / seconds
+        energy_failure = abs(energy - w.energy_before[i] - w.energy_gain[i]) * (1.0 / seconds)
         water_failure = abs(water - w.water_before[i] - w.water_gain[i])
         r.energy_residual_w_m2[i] = max(r.energy_residual_w_m2[i], energy_failure)
         r.water_residual_mm[i] = max(r.water_residual_mm[i], water_failure)
