@@ -2,7 +2,7 @@
 from sim.canopy import stress_ramp
 from sim.carbon import photosynthesis
 from sim.interception import intercepted, snow_capacity, snow_melt, snow_sublimation, unloaded
-from sim.jit import phase
+from sim.jit import compiled
 from sim.radiation import black_body, canopy_interception, path_length, shortwave
 from sim.snow import (
     ICE_HEAT_CAPACITY,
@@ -17,7 +17,7 @@ from sim.weather import FREEZING_POINT_K, PSYCHROMETRIC_PER_HPA
 PSYCHROMETRIC_OVER_ICE = PSYCHROMETRIC_PER_HPA * LATENT_HEAT_VAPORISATION / LATENT_HEAT_SUBLIMATION
 
 
-@phase
+@compiled
 def sunlight(b, t, cos_hour, seconds, observed):
     """Shortwave absorbed by canopy and ground, and photosynthesis."""
     s, p, w = b.s, b.p, b.w
@@ -58,7 +58,7 @@ def sunlight(b, t, cos_hour, seconds, observed):
         w.leaf_coefficient[i] = (conifer + deciduous) * stress * open_stomata
 
 
-@phase
+@compiled
 def darkness(b):
     """The same at night."""
     w = b.w
@@ -73,7 +73,7 @@ def darkness(b):
         w.leaf_coefficient[i] = 0.0
 
 
-@phase
+@compiled
 def any_snow(b):
     """Whether snow falls or lies in any lane, in the canopy or on the ground."""
     s, w = b.s, b.w
@@ -83,7 +83,7 @@ def any_snow(b):
     return not total <= 0.0  # a lane that is not a number leaves the others their snow
 
 
-@phase
+@compiled
 def snowfall(b, seconds):
     """Snow caught, sublimated, melted and shed by the canopy; what falls to the ground."""
     s, p, w = b.s, b.p, b.w
@@ -121,7 +121,7 @@ def snowfall(b, seconds):
         s.albedo[i] = aged if s.swe[i] > 0.0 else p.snow_albedo_fresh[i]
 
 
-@phase
+@compiled
 def no_snow(b):
     """The same without any snow."""
     w = b.w
@@ -132,7 +132,7 @@ def no_snow(b):
         b.s.albedo[i] = b.p.snow_albedo_fresh[i]
 
 
-@phase
+@compiled
 def rainfall(b):
     """Rain and melt held by the canopy; what drips or falls through reaches the soil."""
     s, w = b.s, b.w

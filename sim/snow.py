@@ -25,9 +25,9 @@ def bulk_density(cover, sheltered, exposed) -> float:
 def conductivity(density: float) -> float:
     """Thermal conductivity of snow [W m-1 K-1] (Sturm et al. 1997, Eq. 4)."""
     r = 0.001 * density
-    if r < 0.156:
-        return 0.023 + 0.234 * r
-    return 0.138 - 1.01 * r + 3.233 * r * r
+    light = 0.023 + 0.234 * r
+    dense = 0.138 - 1.01 * r + 3.233 * r * r
+    return light if r < 0.156 else dense
 
 
 @compiled

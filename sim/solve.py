@@ -1,6 +1,6 @@
 """The temperatures of a step: conductances, the nodes' answer to the canopy, and Newton's method for the canopy."""
 from sim.canopy import NEWTON_LIMIT, NEWTON_TOLERANCE, canopy_balance, newton_step
-from sim.jit import phase
+from sim.jit import compiled
 from sim.radiation import black_body, black_body_slope, longwave_down
 from sim.snow import (
     AIR_HEAT_CAPACITY,
@@ -20,7 +20,7 @@ from sim.weather import (
 )
 
 
-@phase
+@compiled
 def conductances(b, seconds):
     """Conductances at the start of the step, evaporation coefficients, and the nodes' answer to the canopy."""
     s, p, w = b.s, b.p, b.w
@@ -124,7 +124,7 @@ def conductances(b, seconds):
         w.high[i] = w.air[i] + 300.0  # a few trees in calm air, and a low sun that shines on nothing else
 
 
-@phase
+@compiled
 def newton_iteration(b):
     """Balance of the canopies at their trial temperatures; those that are off get another. Returns how many."""
     s, p, w = b.s, b.p, b.w
@@ -148,7 +148,7 @@ def newton_iteration(b):
     return off
 
 
-@phase
+@compiled
 def solve_canopy(b):
     """Newton's method for all lanes together; a lane that has converged stays where it is."""
     iterations = 0

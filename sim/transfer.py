@@ -4,14 +4,14 @@ Enthalpies and stores follow from the fluxes, never the other way round; so a sn
 freezes within a step needs no correction.
 """
 from sim.carbon import autotrophic, q10_factor
-from sim.jit import phase
+from sim.jit import compiled
 from sim.radiation import black_body, black_body_slope, longwave_down, longwave_up
 from sim.snow import ICE_HEAT_CAPACITY, LATENT_HEAT_FUSION, LATENT_HEAT_SUBLIMATION, LATENT_HEAT_VAPORISATION
 from sim.water import runoff
 from sim.weather import FREEZING_POINT_K
 
 
-@phase
+@compiled
 def move_energy_and_water(b, seconds):
     """Fluxes at the step's temperatures, moved between the stores."""
     s, p, w, r = b.s, b.p, b.w, b.r
@@ -119,7 +119,7 @@ def move_energy_and_water(b, seconds):
         r.canopy_residual_w_m2[i] = max(r.canopy_residual_w_m2[i], abs(w.residual[i]))
 
 
-@phase
+@compiled
 def move_carbon(b, seconds):
     """Photosynthesis and respiration, moved between air, trees and soil."""
     s, p, w, r = b.s, b.p, b.w, b.r

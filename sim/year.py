@@ -10,7 +10,7 @@ from sim.carbon import SECONDS_PER_YEAR, maintenance_rates
 from sim.day import begin_day, end_day
 from sim.demography import OLDEST, count, grow_older, kill, recruits, self_thinning
 from sim.disturbance import between, disturb
-from sim.jit import phase
+from sim.jit import compiled, phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
 from sim.snow import LATENT_HEAT_FUSION, ground_profile
 from sim.soil import organic_layer
@@ -47,7 +47,7 @@ def simulate_year(b, steps_per_day, days, observed, daily):
     end_year(b)
 
 
-@phase
+@compiled
 def any_sun(b, t, cos_hour, observed):
     """Whether the sun, or observed shortwave, reaches any lane."""
     for i in range(len(b.s.swe)):
