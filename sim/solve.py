@@ -128,7 +128,7 @@ def conductances(b, seconds):
 def newton_iteration(b):
     """Balance of the canopies at their trial temperatures; those that are off get another. Returns how many."""
     s, p, w = b.s, b.p, b.w
-    off = 0
+    moved = 0
     for i in range(len(s.swe)):
         trial, low, high = w.trial[i], w.low[i], w.high[i]
         residual, slope, by_emission, w.net[i], w.ground_new[i] = canopy_balance(
@@ -138,14 +138,14 @@ def newton_iteration(b):
             w.trunk_base[i], w.trunk_by_canopy[i], w.trunk_by_ground[i], w.trunk_canopy[i],
             w.air[i], w.canopy_air[i], w.dry_coefficient[i], w.wet_coefficient[i], w.wet_limit[i],
         )  # fmt: skip
-        converged = abs(residual) <= NEWTON_TOLERANCE
+        off = abs(residual) > NEWTON_TOLERANCE  # not where it is no number: that stays, for closure to find
         proposal, low, high = newton_step(trial, residual, slope, by_emission, low, high)
         w.residual[i] = residual
-        w.trial[i] = trial if converged else proposal
+        w.trial[i] = proposal if off else trial
         w.low[i] = low
         w.high[i] = high
-        off += 0 if converged else 1
-    return off
+        moved += 1 if off else 0
+    return moved
 
 
 @compiled
