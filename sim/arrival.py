@@ -2,7 +2,7 @@
 from sim.canopy import stress_ramp
 from sim.carbon import photosynthesis
 from sim.interception import intercepted, snow_capacity, snow_melt, snow_sublimation, unloaded
-from sim.jit import phase
+from sim.jit import compiled
 from sim.radiation import black_body, canopy_interception, path_length, shortwave
 from sim.snow import (
     ICE_HEAT_CAPACITY,
@@ -12,12 +12,12 @@ from sim.snow import (
     snow_albedo,
     surface_albedo,
 )
-from sim.weather import FREEZING_POINT_K, PSYCHROMETRIC_PER_HPA, saturation_slope
+from sim.weather import FREEZING_POINT_K, PSYCHROMETRIC_PER_HPA
 
 PSYCHROMETRIC_OVER_ICE = PSYCHROMETRIC_PER_HPA * LATENT_HEAT_VAPORISATION / LATENT_HEAT_SUBLIMATION
 
 
-@phase
+@compiled
 def sunlight(b, t, cos_hour, seconds, observed):
     """Shortwave absorbed by canopy and ground, and photosynthesis."""
     s, p, w = b.s, b.p, b.w
@@ -33,16 +33,14 @@ def sunlight(b, t, cos_hour, seconds, observed):
         beam_conifer, beam_deciduous = canopy_interception(
             path, w.crown_area[i], w.share_conifer[i], w.optical_conifer[i], w.optical_deciduous[i]
         )
-        ground = surface_albedo(
-            s.swe[i], w.snow_density[i], p.snow_cover_depth_m[i], s.albedo[i], p.ground_albedo[i]
-        )  # fmt: skip
+        ground = surface_albedo(s.swe[i], w.snow_hiding[i], s.albedo[i], p.ground_albedo[i])
         w.canopy_sw[i], w.ground_sw[i], w.reflected[i], light_conifer, light_deciduous = shortwave(
             w.shortwave[i], w.diffuse[i], beam_conifer, beam_deciduous, w.sky_conifer[i], w.sky_deciduous[i],
             p.albedo_conifer[i], p.albedo_deciduous[i], ground,
         )  # fmt: skip
         stress = w.water_stress[i]
-        dry_conifer = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], p.vpd_high_conifer_hpa[i])
-        dry_deciduous = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], p.vpd_high_deciduous_hpa[i])
+        dry_conifer = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], w.dryness_conifer[i])
+        dry_deciduous = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], w.dryness_deciduous[i])
         w.gpp_conifer[i] = photosynthesis(
             light_conifer, w.leaf_conifer[i], w.light_use_conifer[i], p.par_fraction[i],
             w.temperature_stress_conifer[i], dry_conifer, stress,
@@ -60,7 +58,7 @@ def sunlight(b, t, cos_hour, seconds, observed):
         w.leaf_coefficient[i] = (conifer + deciduous) * stress * open_stomata
 
 
-@phase
+@compiled
 def darkness(b):
     """The same at night."""
     w = b.w
@@ -75,7 +73,7 @@ def darkness(b):
         w.leaf_coefficient[i] = 0.0
 
 
-@phase
+@compiled
 def any_snow(b):
     """Whether snow falls or lies in any lane, in the canopy or on the ground."""
     s, w = b.s, b.w
@@ -85,29 +83,29 @@ def any_snow(b):
     return not total <= 0.0  # a lane that is not a number leaves the others their snow
 
 
-@phase
+@compiled
 def snowfall(b, seconds):
     """Snow caught, sublimated, melted and shed by the canopy; what falls to the ground."""
     s, p, w = b.s, b.p, b.w
     for i in range(len(s.swe)):
         capacity = snow_capacity(w.air[i], w.snow_area[i], p.snow_capacity_warm_mm[i], p.snow_capacity_cold_mm[i])
-        caught = intercepted(w.snow[i], s.canopy_snow[i], capacity, w.snow_efficiency[i])
+        per_capacity = 1.0 / capacity if capacity > 0.0 else 0.0
+        caught = intercepted(w.snow[i], s.canopy_snow[i], capacity, per_capacity, w.snow_efficiency[i])
         store = s.canopy_snow[i] + caught
         ground_emission = black_body(s.ground[i] + FREEZING_POINT_K)
         net = w.canopy_sw[i] + w.longwave_cover[i] * (w.sky[i] + ground_emission - 2.0 * w.air_emission[i])
         lost = snow_sublimation(
-            store, capacity, p.sublimation_exposure[i], net, w.canopy_air[i], w.deficit[i],
-            saturation_slope(w.air[i], w.saturation[i]), PSYCHROMETRIC_OVER_ICE * p.air_pressure_hpa[i],
-            LATENT_HEAT_SUBLIMATION, seconds,
+            store, per_capacity, p.sublimation_exposure[i], net, w.canopy_air[i], w.deficit[i],
+            w.saturation_slope[i], PSYCHROMETRIC_OVER_ICE * p.air_pressure_hpa[i], LATENT_HEAT_SUBLIMATION, seconds,
         )  # fmt: skip
         store -= lost
-        melted = snow_melt(store, capacity, w.air[i], w.canopy_air[i], LATENT_HEAT_FUSION, seconds)
+        melted = snow_melt(store, per_capacity, w.air[i], w.canopy_air[i], LATENT_HEAT_FUSION, seconds)
         store -= melted
-        fallen = unloaded(store, capacity, melted, p.snow_unloading_hours[i], p.snow_unloading_melt[i], seconds)
+        fallen = unloaded(store, capacity, melted, w.unloading_rate[i], p.snow_unloading_melt[i], seconds)
         s.canopy_snow[i] = store - fallen
         w.canopy_sublimation[i] = lost
         w.canopy_melt[i] = melted
-        w.fixed[i] += (LATENT_HEAT_SUBLIMATION * lost + LATENT_HEAT_FUSION * melted) / seconds
+        w.fixed[i] += (LATENT_HEAT_SUBLIMATION * lost + LATENT_HEAT_FUSION * melted) * (1.0 / seconds)
 
         # Snow reaches the ground as cold as the air; the heat it brings is the heat its mass gains.
         ground_snow = w.snow[i] - caught + fallen
@@ -123,7 +121,7 @@ def snowfall(b, seconds):
         s.albedo[i] = aged if s.swe[i] > 0.0 else p.snow_albedo_fresh[i]
 
 
-@phase
+@compiled
 def no_snow(b):
     """The same without any snow."""
     w = b.w
@@ -134,12 +132,14 @@ def no_snow(b):
         b.s.albedo[i] = b.p.snow_albedo_fresh[i]
 
 
-@phase
+@compiled
 def rainfall(b):
     """Rain and melt held by the canopy; what drips or falls through reaches the soil."""
     s, w = b.s, b.w
     for i in range(len(s.swe)):
-        held = intercepted(w.rain[i], s.canopy_rain[i], w.rain_capacity[i], w.longwave_cover[i])
+        held = intercepted(
+            w.rain[i], s.canopy_rain[i], w.rain_capacity[i], w.per_rain_capacity[i], w.longwave_cover[i]
+        )
         wet = s.canopy_rain[i] + held + w.canopy_melt[i]
         drip = max(wet - w.rain_capacity[i], 0.0)
         s.canopy_rain[i] = wet - drip

@@ -10,7 +10,7 @@ from sim.jit import compiled
 from sim.mathematics import exponential
 from sim.radiation import black_body, black_body_slope, longwave_down, longwave_up
 from sim.snow import VON_KARMAN
-from sim.weather import FREEZING_POINT_K
+from sim.weather import FREEZING_POINT_K, STEFAN_BOLTZMANN
 
 NEWTON_TOLERANCE = 1e-7  # W m-2
 NEWTON_LIMIT = 60  # iterations; bisection alone would need 50
@@ -46,9 +46,9 @@ def aerodynamic_conductance(wind, roughness, height, excess) -> float:
 
 
 @compiled
-def stress_ramp(value, zero, one) -> float:
-    """Linear ramp, 0 at `zero`, 1 at `one`; MOD17's scalars of minimum temperature and vapour pressure deficit."""
-    return min(max((value - zero) / (one - zero), 0.0), 1.0)
+def stress_ramp(value, zero, slope) -> float:
+    """Linear ramp, 0 at `zero`, up to 1; MOD17's scalars of minimum temperature and vapour pressure deficit."""
+    return min(max((value - zero) * slope, 0.0), 1.0)
 
 
 @compiled
@@ -67,11 +67,11 @@ def canopy_balance(
     ground_*, trunk_* : how the two answer to the canopy.
     dry_coefficient, wet_coefficient : evaporation per net radiation that is not used otherwise; wet_limit : the
     intercepted rain, as a flux.
-    Returns (residual [W m-2], its slope [W m-2 K-1], net radiation, ground temperature [degC]).
+    Returns (residual [W m-2], its slope [W m-2 K-1], its slope by the canopy's emission alone, net radiation, ground
+    temperature [degC]).
     """
     kelvin = canopy + FREEZING_POINT_K
     emission = black_body(kelvin)
-    emission_slope = black_body_slope(kelvin)
     ground_kelvin = ground + FREEZING_POINT_K
     ground_slope = black_body_slope(ground_kelvin)
 
@@ -79,7 +79,6 @@ def canopy_balance(
     # Below 0 degC, at 0 degC while snow melts, above it when the last snow has melted within the step.
     new_ground = min(free_ground, 0.0) + bare_gain * max(free_ground - melt_span, 0.0)
     gain = 1.0 if free_ground <= 0.0 else (bare_gain if free_ground >= melt_span else 0.0)
-    answer = gain * (ground_by_emission * emission_slope + ground_by_canopy)
     trunk = trunk_base + trunk_by_canopy * canopy + trunk_by_ground * new_ground
 
     up = longwave_up(
@@ -87,9 +86,7 @@ def canopy_balance(
         longwave_down(sky, emission, cover),
         ground_emissivity,
     )
-    up_slope = ground_emissivity * ground_slope * answer + (1.0 - ground_emissivity) * cover * emission_slope
     net = shortwave_absorbed + cover * (sky + up - 2.0 * emission)
-    net_slope = cover * (up_slope - 2.0 * emission_slope)
 
     available = max(net - fixed, 0.0)
     wet = wet_coefficient * available
@@ -98,20 +95,29 @@ def canopy_balance(
 
     latent = dry_coefficient * available + min(wet, wet_limit)
     residual = net - air_conductance * (canopy - air) - latent - fixed - trunk_conductance * (canopy - trunk)
-    slope = (
-        net_slope * (1.0 - used)
-        - air_conductance
-        - trunk_conductance * (1.0 - trunk_by_canopy - trunk_by_ground * answer)
-    )
-    return residual, slope, net, new_ground
+    # Warmer ground gives the canopy longwave, and heat by the trunk.
+    from_ground = ground_emissivity * ground_slope * cover * (1.0 - used) + trunk_conductance * trunk_by_ground
+    reflected = (1.0 - ground_emissivity) * cover
+    by_emission = cover * (reflected - 2.0) * (1.0 - used) + from_ground * (gain * ground_by_emission)
+    by_canopy = from_ground * (gain * ground_by_canopy) - air_conductance - trunk_conductance * (1.0 - trunk_by_canopy)
+    return residual, by_emission * black_body_slope(kelvin) + by_canopy, by_emission, net, new_ground
 
 
 @compiled
-def newton_step(trial, residual, slope, low, high):
-    """Next trial temperature and bracket: Newton's step, halved bracket where it would leave it (at kinks)."""
+def newton_step(trial, residual, slope, by_emission, low, high):
+    """Next trial temperature and bracket: Newton's step, halved bracket where it would leave it (at kinks).
+
+    But for kinks the residual is a line and `by_emission` times the fourth power of temperature. So its curvature is
+    known, and the step is bent by it, to the third order: one step then mostly does what two would.
+    """
     low = trial if residual > 0.0 else low
     high = trial if residual < 0.0 else high
-    newton = trial - residual / slope
+    kelvin = trial + FREEZING_POINT_K
+    inverse = 1.0 / slope
+    third = 4.0 * STEFAN_BOLTZMANN * kelvin * by_emission * inverse
+    second = 1.5 * kelvin * third
+    step = -residual * inverse
+    newton = trial + step * (1.0 - step * (second - step * (2.0 * second * second - third)))
     inside = low < newton and newton < high
     proposal = newton if inside else 0.5 * (low + high)
     return proposal, low, high

@@ -5,7 +5,7 @@ from sim.canopy import leaf_out, stress_ramp
 from sim.carbon import litter_share
 from sim.disturbance import fire
 from sim.forcing import generated_weather, observed_weather, sun
-from sim.jit import phase
+from sim.jit import compiled, phase
 from sim.mathematics import exponential
 from sim.radiation import canopy_interception
 from sim.snow import AIR_HEAT_CAPACITY, bulk_density, conductivity
@@ -66,7 +66,9 @@ def canopy_structure(b, day):
             1.0 - exponential(-w.optical_deciduous[i] * thinner)
         )
         w.snow_efficiency[i] = caught * p.interception[i]
-        w.rain_capacity[i] = p.rain_capacity_mm[i] * w.snow_area[i] * p.interception[i]
+        capacity = p.rain_capacity_mm[i] * w.snow_area[i] * p.interception[i]
+        w.rain_capacity[i] = capacity
+        w.per_rain_capacity[i] = 1.0 / capacity if capacity > 0.0 else 0.0
 
         crowns = w.cover_conifer[i] + w.cover_deciduous[i]
         w.trunk_air[i] = p.trunk_air_conductance[i] * p.woody_area_index[i] * crowns
@@ -74,25 +76,29 @@ def canopy_structure(b, day):
         w.trunk_ground[i] = p.trunk_ground_conductance[i] * crowns
         w.snow_density[i] = bulk_density(crowns, p.snow_density_sheltered[i], p.snow_density_open[i])
         w.snow_resistance[i] = 1.0 / (w.snow_density[i] * conductivity(w.snow_density[i]))
+        w.snow_hiding[i] = 1.0 / (w.snow_density[i] * p.snow_cover_depth_m[i])
         w.temperature_stress_conifer[i] = stress_ramp(
-            w.minimum_temperature[i], p.tmin_low_conifer[i], p.tmin_high_conifer[i]
+            w.minimum_temperature[i], p.tmin_low_conifer[i], 1.0 / (p.tmin_high_conifer[i] - p.tmin_low_conifer[i])
         )
         w.temperature_stress_deciduous[i] = stress_ramp(
-            w.minimum_temperature[i], p.tmin_low_deciduous[i], p.tmin_high_deciduous[i]
-        )
+            w.minimum_temperature[i], p.tmin_low_deciduous[i],
+            1.0 / (p.tmin_high_deciduous[i] - p.tmin_low_deciduous[i]),
+        )  # fmt: skip
         wind_exchange(b, i, p.wind_speed_m_s[i])
         w.vapour_density[i] = w.air_density[i] * 0.622 / p.air_pressure_hpa[i]
 
 
-@phase
+@compiled
 def wind_exchange(b, i, wind):
     """Exchange of a lane's ground [m s-1] and canopy [W m-2 K-1] with the air at a wind speed [m s-1]."""
     p, w = b.p, b.w
     crowns = w.cover_conifer[i] + w.cover_deciduous[i]
     snow = b.s.swe[i] > SNOW_DAY_MM
     sheltered = wind * (1.0 - p.wind_reduction[i] * crowns)
-    w.wind_below[i] = (w.snow_wind[i] if snow else w.ground_wind[i]) * sheltered
-    w.ground_velocity[i] = (w.snow_log[i] if snow else w.ground_log[i]) * sheltered
+    # Loaded before they are chosen from: a conditional load keeps the loop from being vectorised.
+    snow_wind, ground_wind, snow_log, ground_log = w.snow_wind[i], w.ground_wind[i], w.snow_log[i], w.ground_log[i]
+    w.wind_below[i] = (snow_wind if snow else ground_wind) * sheltered
+    w.ground_velocity[i] = (snow_log if snow else ground_log) * sheltered
     exchange = w.air_density[i] * AIR_HEAT_CAPACITY * (w.canopy_log[i] * wind)
     w.canopy_air[i] = max(exchange, p.minimum_conductance[i]) * max(w.longwave_cover[i], 1e-3)
 

@@ -1,6 +1,7 @@
 """How the physics is compiled, and how the same source runs uncompiled.
 
-Process functions carry `@compiled`; functions that loop over the lanes of a block carry `@phase`. IEEE arithmetic is
+Process functions carry `@compiled`; functions that loop over the lanes of a block carry `@phase`, but for those of a
+step, which are `@compiled` into one: what a phase hands to the next then stays in registers. IEEE arithmetic is
 strict (no fastmath), so that one stand and sixteen stands in lockstep give the same bits; `error_model="numpy"` drops
 the zero check of each division, and `forceinline` the calls, without which no loop over lanes is vectorised.
 

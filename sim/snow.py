@@ -25,9 +25,9 @@ def bulk_density(cover, sheltered, exposed) -> float:
 def conductivity(density: float) -> float:
     """Thermal conductivity of snow [W m-1 K-1] (Sturm et al. 1997, Eq. 4)."""
     r = 0.001 * density
-    if r < 0.156:
-        return 0.023 + 0.234 * r
-    return 0.138 - 1.01 * r + 3.233 * r * r
+    light = 0.023 + 0.234 * r
+    dense = 0.138 - 1.01 * r + 3.233 * r * r
+    return light if r < 0.156 else dense
 
 
 @compiled
@@ -37,15 +37,17 @@ def snow_albedo(albedo, temperature, snowfall, fresh, cold, old, cold_hours, mel
     melting = temperature > MELTING_FROM_C
     hours = melt_hours if melting else cold_hours
     limit = old if melting else min(albedo, cold)
-    ageing = seconds / (3600.0 * hours)
-    renewal = snowfall / refresh
-    return (albedo + ageing * limit + renewal * fresh) / (1.0 + ageing + renewal)
+    # Weights of the old albedo, of the limit and of fresh snow; all times `refresh` x the time, for a single division.
+    staying = 3600.0 * hours * refresh
+    ageing = seconds * refresh
+    renewal = snowfall * (3600.0 * hours)
+    return (staying * albedo + ageing * limit + renewal * fresh) / (staying + ageing + renewal)
 
 
 @compiled
-def surface_albedo(swe, density, cover_depth, snow, ground) -> float:
-    """Albedo of the ground, with snow hiding it from `cover_depth` [m] on (FSM2)."""
-    hidden = min(swe / (density * cover_depth), 1.0)
+def surface_albedo(swe, hidden_per_mm, snow, ground) -> float:
+    """Albedo of the ground, with snow hiding `hidden_per_mm` of it, at most all (FSM2)."""
+    hidden = min(swe * hidden_per_mm, 1.0)
     return ground + (snow - ground) * hidden
 
 
@@ -62,8 +64,7 @@ def ground_profile(wind_height, height, roughness, thermal_ratio) -> tuple[float
 def stability(surface, air, wind_below, height, damping, limit) -> float:
     """Factor on turbulent exchange: 1 / (1 + 10 Ri) over a cold surface (Price and Dunne 1976), and its counterpart
     sqrt(1 + 10 |Ri|), limited, over a warm one. wind_below : at `height`."""
-    shear = max(wind_below * wind_below, 1e-6)
-    richardson = GRAVITY * height * (air - surface) / ((air + FREEZING_POINT_K) * shear)
-    stable = 1.0 / (1.0 + damping * max(richardson, 0.0))
-    unstable = min(math.sqrt(1.0 + damping * max(-richardson, 0.0)), limit)
-    return stable if richardson > 0.0 else unstable
+    shear = (air + FREEZING_POINT_K) * max(wind_below * wind_below, 1e-6)
+    buoyancy = damping * GRAVITY * height * (air - surface)  # 10 Ri is their ratio
+    factor = (shear + max(-buoyancy, 0.0)) / (shear + max(buoyancy, 0.0))
+    return factor if buoyancy > 0.0 else min(math.sqrt(factor), limit)

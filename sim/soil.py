@@ -1,7 +1,8 @@
 """Soil heat: moss and organic layer, two nodes that freeze by enthalpy, and the fixed boundary far below.
 
 Enthalpy in J m-2 with 0 at thawed soil of 0 degC. The water that freezes is a property of the column, apart from
-the bucket of `sim.water`.
+the bucket of `sim.water`. Where several functions divide by the freezing range, each multiplies by 1 / range: the
+compiler makes one division of them all.
 """
 import math
 
@@ -16,7 +17,7 @@ def temperature(enthalpy, thawed, frozen, latent, freezing_range) -> float:
     """
     bottom = -(latent + frozen * freezing_range)
     cold = enthalpy <= bottom
-    capacity = thawed if enthalpy >= 0.0 else (frozen if cold else latent / freezing_range + frozen)
+    capacity = thawed if enthalpy >= 0.0 else (frozen if cold else latent * (1.0 / freezing_range) + frozen)
     return (enthalpy - (bottom if cold else 0.0)) / capacity - (freezing_range if cold else 0.0)
 
 
@@ -33,20 +34,26 @@ def enthalpy(node_temperature, thawed, frozen, latent, freezing_range) -> float:
 @compiled
 def heat_capacity(node_temperature, thawed, frozen, latent, freezing_range) -> float:
     """Slope of enthalpy [J m-2 K-1], freezing included."""
-    freezing = latent / freezing_range + frozen
+    freezing = latent * (1.0 / freezing_range) + frozen
     return thawed if node_temperature >= 0.0 else (freezing if node_temperature > -freezing_range else frozen)
 
 
 @compiled
 def frozen_share(node_temperature, freezing_range) -> float:
     """Share of the water that is ice."""
-    return min(max(-node_temperature / freezing_range, 0.0), 1.0)
+    return min(max(-node_temperature * (1.0 / freezing_range), 0.0), 1.0)
 
 
 @compiled
 def conductivity(frozen, thawed_value, frozen_value) -> float:
     """Conductivity [W m-1 K-1] between thawed and frozen."""
     return thawed_value + (frozen_value - thawed_value) * frozen
+
+
+@compiled
+def in_series(first_depth, first, second_depth, second) -> float:
+    """Conductance [W m-2 K-1] of two layers, one upon the other, from depths [m] and conductivities [W m-1 K-1]."""
+    return first * second / (first_depth * second + second_depth * first)
 
 
 @compiled
@@ -71,8 +78,8 @@ def respond_to_canopy(
     W m-2 K-1. Every node's balance is linear (the ground's emission about its old temperature), so each is a line
     in the temperature of the node above it; what remains is the canopy's own equation.
     Returns the coefficients (deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base,
-    trunk_by_canopy, trunk_by_ground, ground_base, ground_by_emission, ground_by_canopy) and the ground's stiffness
-    [W m-2 K-1]; `yielding` is its inverse.
+    trunk_by_canopy, trunk_by_ground, ground_base, ground_by_emission, ground_by_canopy), the ground's stiffness
+    [W m-2 K-1] and its inverse, `yielding`.
     """
     yielding = 1.0 / (deep_inertia + surface_deep + deep_boundary)
     deep_base = (deep_inertia * deep + deep_boundary * boundary) * yielding
@@ -108,7 +115,7 @@ def respond_to_canopy(
     ground_by_canopy = trunk_ground * trunk_by_canopy * yielding
     return (
         deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base, trunk_by_canopy, trunk_by_ground,
-        ground_base, ground_by_emission, ground_by_canopy, stiffness,
+        ground_base, ground_by_emission, ground_by_canopy, stiffness, yielding,
     )  # fmt: skip
 
 

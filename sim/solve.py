@@ -1,6 +1,6 @@
 """The temperatures of a step: conductances, the nodes' answer to the canopy, and Newton's method for the canopy."""
 from sim.canopy import NEWTON_LIMIT, NEWTON_TOLERANCE, canopy_balance, newton_step
-from sim.jit import phase
+from sim.jit import compiled
 from sim.radiation import black_body, black_body_slope, longwave_down
 from sim.snow import (
     AIR_HEAT_CAPACITY,
@@ -10,7 +10,7 @@ from sim.snow import (
     LATENT_HEAT_VAPORISATION,
     stability,
 )
-from sim.soil import conductivity, frozen_share, heat_capacity, respond_to_canopy, temperature
+from sim.soil import conductivity, frozen_share, heat_capacity, in_series, respond_to_canopy, temperature
 from sim.weather import (
     FREEZING_POINT_K,
     PSYCHROMETRIC_PER_HPA,
@@ -20,21 +20,22 @@ from sim.weather import (
 )
 
 
-@phase
+@compiled
 def conductances(b, seconds):
     """Conductances at the start of the step, evaporation coefficients, and the nodes' answer to the canopy."""
     s, p, w = b.s, b.p, b.w
+    per_second = 1.0 / seconds
     for i in range(len(s.swe)):
-        slope = saturation_slope(w.air[i], w.saturation[i])
+        slope = w.saturation_slope[i]
         equilibrium = slope / (slope + PSYCHROMETRIC_PER_HPA * p.air_pressure_hpa[i])
-        wet_share = s.canopy_rain[i] / w.rain_capacity[i] if w.rain_capacity[i] > 0.0 else 0.0
+        wet_share = s.canopy_rain[i] * w.per_rain_capacity[i]
         dry = (1.0 - wet_share) * equilibrium * w.leaf_coefficient[i]
         wet = wet_share * equilibrium * p.priestley_taylor_wet[i]
         # Above 35 degC Priestley and Taylor's 1.26 would evaporate more than the net radiation.
         scale = 1.0 / max(dry + wet, 1.0)
         w.dry_coefficient[i] = dry * scale
         w.wet_coefficient[i] = wet * scale
-        w.wet_limit[i] = LATENT_HEAT_VAPORISATION * s.canopy_rain[i] / seconds
+        w.wet_limit[i] = LATENT_HEAT_VAPORISATION * per_second * s.canopy_rain[i]
 
         velocity = w.ground_velocity[i] * stability(
             s.ground[i], w.air[i], w.wind_below[i], p.ground_reference_height_m[i],
@@ -88,31 +89,24 @@ def conductances(b, seconds):
             p.organic_conductivity_frozen[i],
         )
         w.upper_soil[i] = w.half_surface[i] / soil_upper
-        w.surface_conductance[i] = 1.0 / (
-            s.swe[i] * w.snow_resistance[i]
-            + s.organic_depth[i] * p.moss[i] / organic
-            + w.upper_soil[i]
-        )
-        w.deep_conductance[i] = 1.0 / (w.half_surface[i] / soil_lower + w.above_deep_node[i] / soil_deep)
-        w.boundary_conductance[i] = soil_below / w.below_deep_node[i]
+        above_and_below = s.swe[i] * w.snow_resistance[i] + w.upper_soil[i]  # of the organic layer
+        w.surface_conductance[i] = in_series(above_and_below, 1.0, s.organic_depth[i] * p.moss[i], organic)
+        w.deep_conductance[i] = in_series(w.half_surface[i], soil_lower, w.above_deep_node[i], soil_deep)
+        w.boundary_conductance[i] = soil_below * w.per_below_deep_node[i]
 
-        surface_inertia = (
-            heat_capacity(
-                w.surface[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], p.soil_freezing_range_k[i]
-            )
-            / seconds
+        surface_inertia = per_second * heat_capacity(
+            w.surface[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], p.soil_freezing_range_k[i]
         )
-        deep_inertia = (
-            heat_capacity(w.deep[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], p.soil_freezing_range_k[i])
-            / seconds
+        deep_inertia = per_second * heat_capacity(
+            w.deep[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], p.soil_freezing_range_k[i]
         )
         (
             w.deep_base[i], w.deep_by_surface[i], w.surface_base[i], w.surface_by_ground[i], w.trunk_base[i],
             w.trunk_by_canopy[i], w.trunk_by_ground[i], w.ground_base[i], w.ground_by_emission[i],
-            w.ground_by_canopy[i], stiffness,
+            w.ground_by_canopy[i], stiffness, yielding,
         ) = respond_to_canopy(
-            s.trunk[i], s.trunk_capacity[i] / seconds, w.trunk_canopy[i], w.trunk_air[i], w.trunk_ground[i],
-            s.ground[i], (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) / seconds, w.ground_conductance[i],
+            s.trunk[i], s.trunk_capacity[i] * per_second, w.trunk_canopy[i], w.trunk_air[i], w.trunk_ground[i],
+            s.ground[i], (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) * per_second, w.ground_conductance[i],
             w.ground_sw[i] + p.ground_emissivity[i] * (1.0 - w.longwave_cover[i]) * w.sky[i]
             - w.ground_latent[i] + w.latent_slope[i] * (ice - s.ground[i]),
             emission, emission_slope, w.latent_slope[i], p.ground_emissivity[i], w.longwave_cover[i], w.air[i],
@@ -121,43 +115,42 @@ def conductances(b, seconds):
             boundary,
         )  # fmt: skip
         # At 0 degC some snow sublimates and the rest can melt; beyond, its heat capacity and its vapour are gone.
-        sublimating = (w.ground_latent[i] - w.latent_slope[i] * ice) * seconds / LATENT_HEAT_SUBLIMATION
+        sublimating = (w.ground_latent[i] - w.latent_slope[i] * ice) * (seconds / LATENT_HEAT_SUBLIMATION)
         meltable = s.swe[i] - sublimating if snow else 0.0
-        w.melt_span[i] = LATENT_HEAT_FUSION * max(meltable, 0.0) / (seconds * stiffness)
-        w.bare_gain[i] = stiffness / (stiffness - ICE_HEAT_CAPACITY * s.swe[i] / seconds - w.latent_slope[i])
+        w.melt_span[i] = LATENT_HEAT_FUSION * max(meltable, 0.0) * (per_second * yielding)
+        w.bare_gain[i] = stiffness / (stiffness - ICE_HEAT_CAPACITY * s.swe[i] * per_second - w.latent_slope[i])
         w.trial[i] = s.canopy[i]
         w.low[i] = w.air[i] - 100.0
         w.high[i] = w.air[i] + 300.0  # a few trees in calm air, and a low sun that shines on nothing else
 
 
-@phase
-def canopy_residual(b):
-    """Residual of the canopy's balance at the trial temperatures; returns whether any lane is still off."""
+@compiled
+def newton_iteration(b):
+    """Balance of the canopies at their trial temperatures; those that are off get another. Returns how many."""
     s, p, w = b.s, b.p, b.w
+    moved = 0
     for i in range(len(s.swe)):
-        w.residual[i], w.slope[i], w.net[i], w.ground_new[i] = canopy_balance(
-            w.trial[i], w.fixed[i], w.canopy_sw[i], w.sky[i], w.longwave_cover[i], p.ground_emissivity[i],
+        trial, low, high = w.trial[i], w.low[i], w.high[i]
+        residual, slope, by_emission, w.net[i], w.ground_new[i] = canopy_balance(
+            trial, w.fixed[i], w.canopy_sw[i], w.sky[i], w.longwave_cover[i], p.ground_emissivity[i],
             s.ground[i], w.melt_span[i], w.bare_gain[i],
             w.ground_base[i], w.ground_by_emission[i], w.ground_by_canopy[i],
             w.trunk_base[i], w.trunk_by_canopy[i], w.trunk_by_ground[i], w.trunk_canopy[i],
             w.air[i], w.canopy_air[i], w.dry_coefficient[i], w.wet_coefficient[i], w.wet_limit[i],
         )  # fmt: skip
-    off = 0.0
-    for i in range(len(s.swe)):
-        off += 0.0 if abs(w.residual[i]) <= NEWTON_TOLERANCE else 1.0
-    return off > 0.0
+        off = abs(residual) > NEWTON_TOLERANCE  # not where it is no number: that stays, for closure to find
+        proposal, low, high = newton_step(trial, residual, slope, by_emission, low, high)
+        w.residual[i] = residual
+        w.trial[i] = proposal if off else trial
+        w.low[i] = low
+        w.high[i] = high
+        moved += 1 if off else 0
+    return moved
 
 
-@phase
+@compiled
 def solve_canopy(b):
     """Newton's method for all lanes together; a lane that has converged stays where it is."""
-    w = b.w
     iterations = 0
-    while canopy_residual(b) and iterations < NEWTON_LIMIT:
-        for i in range(len(w.trial)):
-            proposal, low, high = newton_step(w.trial[i], w.residual[i], w.slope[i], w.low[i], w.high[i])
-            off = abs(w.residual[i]) > NEWTON_TOLERANCE
-            w.trial[i] = proposal if off else w.trial[i]
-            w.low[i] = low
-            w.high[i] = high
+    while newton_iteration(b) > 0 and iterations < NEWTON_LIMIT:
         iterations += 1

@@ -137,25 +137,25 @@ FORCING = (
 
 #: What a step, a day or a year computes and hands on; nothing here lasts beyond the year.
 _WORK = """
-above_deep_node advected air air_density air_emission air_sum amplitude anomaly bare_gain below_deep_node
-biomass_before boundary_before boundary_conductance canopy_air canopy_log canopy_melt canopy_sublimation
-canopy_sum canopy_sw cos_latitude cos_peak cos_warmest cover_conifer cover_deciduous crown_area deep deep_base
-deep_by_surface deep_conductance deep_frozen deep_latent deep_sum deep_thawed deficit density_change diffuse
-dry_coefficient emissivity energy_before energy_gain et_before extraterrestrial first_cut_age fixed frozen_ratio
-gpp_before gpp_conifer gpp_deciduous ground_base ground_by_canopy ground_by_emission ground_conductance
+above_deep_node advected air air_density air_emission air_sum amplitude anomaly bare_gain biomass_before
+boundary_before boundary_conductance canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum canopy_sw
+cos_latitude cos_peak cos_warmest cover_conifer cover_deciduous crown_area deep deep_base deep_by_surface
+deep_conductance deep_frozen deep_latent deep_sum deep_thawed deficit density_change diffuse dry_coefficient
+dryness_conifer dryness_deciduous emissivity energy_before energy_gain et_before extraterrestrial first_cut_age fixed
+frozen_ratio gpp_before gpp_conifer gpp_deciduous ground_base ground_by_canopy ground_by_emission ground_conductance
 ground_latent ground_log ground_new ground_sum ground_sw ground_velocity ground_wind half_surface high humidity
 infiltration lai_conifer lai_deciduous latent_before latent_slope leaf_coefficient leaf_conifer leaf_deciduous
 leaf_rate light_use_conifer light_use_deciduous log_q10 longwave_cover low mean_temperature melt_span
-minimum_temperature mix net net_before optical_conifer optical_deciduous precipitation precipitation_step
-products_before products_decay ra_before rain rain_capacity reflected reflected_sum residual rh_before
-runoff_before saturation sensible_before share_conifer shortwave shortwave_sum sin_latitude sin_peak sin_warmest
-sky sky_conifer sky_deciduous slope snow snow_area snow_density snow_efficiency snow_log snow_resistance
-snow_wind soil_before soil_heat_sum soil_rate soil_top stems_before stems_gain summer_down summer_up sun_a sun_b
-surface surface_base surface_by_ground surface_conductance surface_frozen surface_latent surface_sum
+minimum_temperature mix net net_before optical_conifer optical_deciduous per_below_deep_node per_rain_capacity
+precipitation precipitation_step products_before products_decay ra_before rain rain_capacity reflected reflected_sum
+residual rh_before runoff_before saturation_slope sensible_before share_conifer shortwave shortwave_sum sin_latitude
+sin_peak sin_warmest sky sky_conifer sky_deciduous snow snow_area snow_density snow_efficiency snow_hiding snow_log
+snow_resistance snow_wind soil_before soil_heat_sum soil_rate soil_top stems_before stems_gain summer_down summer_up
+sun_a sun_b surface surface_base surface_by_ground surface_conductance surface_frozen surface_latent surface_sum
 surface_thawed sw_before temperature_stress_conifer temperature_stress_deciduous thaw_seconds thaw_warmth
 top_of_canopy top_sum transpiration_conifer transpiration_deciduous trial trunk_air trunk_base trunk_by_canopy
-trunk_by_ground trunk_canopy trunk_ground upper_soil vapour vapour_density water_before water_gain water_stress
-wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
+trunk_by_ground trunk_canopy trunk_ground unloading_rate upper_soil vapour vapour_density water_before water_gain
+water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
 """.split()
 
 

@@ -5,16 +5,16 @@ the stores alone that nothing was lost.
 """
 from sim.arrival import any_snow, darkness, no_snow, rainfall, snowfall, sunlight
 from sim.day import wind_exchange
-from sim.jit import phase
+from sim.jit import compiled
 from sim.radiation import black_body
 from sim.snow import ICE_HEAT_CAPACITY, LATENT_HEAT_FUSION
 from sim.solve import conductances, solve_canopy
 from sim.transfer import move_carbon, move_energy_and_water
 from sim.water import water_stress
-from sim.weather import FREEZING_POINT_K, saturation_pressure, saturation_pressure_water, snow_share
+from sim.weather import FREEZING_POINT_K, saturation_pressure, saturation_pressure_water, saturation_slope, snow_share
 
 
-@phase
+@compiled
 def simulate_step(b, t, cos_hour, sin_hour, sun_up, seconds, observed):
     """Advance a block by one step of `seconds`.
 
@@ -42,7 +42,7 @@ def simulate_step(b, t, cos_hour, sin_hour, sun_up, seconds, observed):
     balance(b, seconds)
 
 
-@phase
+@compiled
 def generated_air(b, cos_hour, sin_hour, seconds):
     """Air temperature, longwave and precipitation of the step, from the day's generated weather."""
     w = b.w
@@ -53,7 +53,7 @@ def generated_air(b, cos_hour, sin_hour, seconds):
         w.precipitation_step[i] = w.precipitation[i] * (seconds / 86400.0)
 
 
-@phase
+@compiled
 def observed_air(b, row):
     """The same from observation; row : (6, lanes), columns as in `sim.state.FORCING`."""
     w = b.w
@@ -66,15 +66,16 @@ def observed_air(b, row):
         wind_exchange(b, i, row[2, i])
 
 
-@phase
+@compiled
 def stores_before(b, seconds):
     """Saturation, rain and snow of the step, drought stress, and what is stored before it."""
     s, p, w = b.s, b.p, b.w
     for i in range(len(s.swe)):
-        w.saturation[i] = saturation_pressure(w.air[i])
+        saturation = saturation_pressure(w.air[i])
+        w.saturation_slope[i] = saturation_slope(w.air[i], saturation)
         # The vapour of the day's mean is more than a cold night's air can hold: the rest is dew and fog, not followed.
-        w.humidity[i] = min(w.vapour[i], w.saturation[i])
-        w.deficit[i] = w.saturation[i] - w.humidity[i]
+        w.humidity[i] = min(w.vapour[i], saturation)
+        w.deficit[i] = saturation - w.humidity[i]
         w.snow[i] = w.precipitation_step[i] * snow_share(w.air[i])
         w.rain[i] = w.precipitation_step[i] - w.snow[i]
         w.water_stress[i] = water_stress(
@@ -91,7 +92,7 @@ def stores_before(b, seconds):
         w.water_before[i] = ice + s.canopy_rain[i] + s.soil_water[i]
 
 
-@phase
+@compiled
 def balance(b, seconds):
     """Whether the stores changed by what crossed the stand's boundary, energy and water."""
     s, p, w, r = b.s, b.p, b.w, b.r
@@ -105,7 +106,7 @@ def balance(b, seconds):
             - LATENT_HEAT_FUSION * ice
         )
         water = ice + s.canopy_rain[i] + s.soil_water[i]
-        energy_failure = abs(energy - w.energy_before[i] - w.energy_gain[i]) / seconds
+        energy_failure = abs(energy - w.energy_before[i] - w.energy_gain[i]) * (1.0 / seconds)
         water_failure = abs(water - w.water_before[i] - w.water_gain[i])
         r.energy_residual_w_m2[i] = max(r.energy_residual_w_m2[i], energy_failure)
         r.water_residual_mm[i] = max(r.water_residual_mm[i], water_failure)

@@ -4,17 +4,19 @@ Enthalpies and stores follow from the fluxes, never the other way round; so a sn
 freezes within a step needs no correction.
 """
 from sim.carbon import autotrophic, q10_factor
-from sim.jit import phase
+from sim.jit import compiled
 from sim.radiation import black_body, black_body_slope, longwave_down, longwave_up
 from sim.snow import ICE_HEAT_CAPACITY, LATENT_HEAT_FUSION, LATENT_HEAT_SUBLIMATION, LATENT_HEAT_VAPORISATION
 from sim.water import runoff
 from sim.weather import FREEZING_POINT_K
 
 
-@phase
+@compiled
 def move_energy_and_water(b, seconds):
     """Fluxes at the step's temperatures, moved between the stores."""
     s, p, w, r = b.s, b.p, b.w, b.r
+    per_second = 1.0 / seconds
+    to_vapour = seconds / LATENT_HEAT_VAPORISATION  # mm per W m-2
     for i in range(len(s.swe)):
         canopy = w.trial[i]
         ground = w.ground_new[i]
@@ -32,8 +34,8 @@ def move_energy_and_water(b, seconds):
         net_stand = w.shortwave[i] - w.reflected[i] + w.sky[i] - to_sky
 
         available = max(w.net[i] - w.fixed[i], 0.0)
-        transpired = w.dry_coefficient[i] * available * seconds / LATENT_HEAT_VAPORISATION
-        evaporated = min(w.wet_coefficient[i] * available, w.wet_limit[i]) * seconds / LATENT_HEAT_VAPORISATION
+        transpired = w.dry_coefficient[i] * available * to_vapour
+        evaporated = min(w.wet_coefficient[i] * available, w.wet_limit[i]) * to_vapour
         canopy_heat = w.canopy_air[i] * (canopy - w.air[i])
         trunk_heat = w.trunk_air[i] * (trunk - w.air[i])
         ground_heat = w.ground_conductance[i] * (ground - w.air[i])
@@ -45,9 +47,9 @@ def move_energy_and_water(b, seconds):
 
         snow = s.swe[i] > 0.0
         latent = w.ground_latent[i] + w.latent_slope[i] * (min(ground, 0.0) - min(s.ground[i], 0.0))
-        sublimated = min(latent * seconds / LATENT_HEAT_SUBLIMATION, s.swe[i]) if snow else 0.0
-        soil_evaporated = 0.0 if snow else latent * seconds / LATENT_HEAT_VAPORISATION
-        latent = (LATENT_HEAT_SUBLIMATION * sublimated + LATENT_HEAT_VAPORISATION * soil_evaporated) / seconds
+        sublimated = min(latent * (seconds / LATENT_HEAT_SUBLIMATION), s.swe[i]) if snow else 0.0
+        soil_evaporated = 0.0 if snow else latent * to_vapour
+        latent = (LATENT_HEAT_SUBLIMATION * sublimated + LATENT_HEAT_VAPORISATION * soil_evaporated) * per_second
 
         # The ground's enthalpy: snow that sublimates takes its own sensible heat along; what would warm snow above
         # 0 degC melts it; what is left after the last snow warms the skin.
@@ -58,7 +60,7 @@ def move_energy_and_water(b, seconds):
             - ground_heat - latent + trunk_to_ground - ground_to_surface
         )  # fmt: skip
         s.swe[i] -= sublimated
-        melted = min(max(heat, 0.0) / LATENT_HEAT_FUSION, s.swe[i]) if snow else 0.0
+        melted = min(max(heat, 0.0) * (1.0 / LATENT_HEAT_FUSION), s.swe[i]) if snow else 0.0
         heat -= LATENT_HEAT_FUSION * melted
         s.swe[i] -= melted
         s.ground[i] = heat / (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i])
@@ -117,7 +119,7 @@ def move_energy_and_water(b, seconds):
         r.canopy_residual_w_m2[i] = max(r.canopy_residual_w_m2[i], abs(w.residual[i]))
 
 
-@phase
+@compiled
 def move_carbon(b, seconds):
     """Photosynthesis and respiration, moved between air, trees and soil."""
     s, p, w, r = b.s, b.p, b.w, b.r

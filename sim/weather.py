@@ -24,7 +24,7 @@ def saturation_pressure(temperature: float) -> float:
     scale = 6.1121 if over_ice else 6.1094
     a = 22.587 if over_ice else 17.625
     b = 273.86 if over_ice else 243.04
-    return scale * exponential(a * temperature / (temperature + b))
+    return scale * exponential(a * temperature * (1.0 / (temperature + b)))
 
 
 @compiled
@@ -33,7 +33,8 @@ def saturation_slope(temperature: float, saturation: float) -> float:
     over_ice = temperature <= 0.0
     a = 22.587 if over_ice else 17.625
     b = 273.86 if over_ice else 243.04
-    return saturation * a * b / ((temperature + b) * (temperature + b))
+    inverse = 1.0 / (temperature + b)  # which `saturation_pressure` has too: one division for both
+    return saturation * (a * b) * (inverse * inverse)
 
 
 @compiled

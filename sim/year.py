@@ -10,7 +10,7 @@ from sim.carbon import SECONDS_PER_YEAR, maintenance_rates
 from sim.day import begin_day, end_day
 from sim.demography import OLDEST, count, grow_older, kill, recruits, self_thinning
 from sim.disturbance import between, disturb
-from sim.jit import phase
+from sim.jit import compiled, phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
 from sim.snow import LATENT_HEAT_FUSION, ground_profile
 from sim.soil import organic_layer
@@ -47,7 +47,7 @@ def simulate_year(b, steps_per_day, days, observed, daily):
     end_year(b)
 
 
-@phase
+@compiled
 def any_sun(b, t, cos_hour, observed):
     """Whether the sun, or observed shortwave, reaches any lane."""
     for i in range(len(b.s.swe)):
@@ -121,7 +121,7 @@ def manage(b, i):
 
 @phase
 def site_constants(b, i):
-    """What the parameters fix for the year: angles, wind profiles, the soil nodes."""
+    """What the parameters fix for the year: angles, wind profiles, the soil nodes, slopes and rates."""
     p, w = b.p, b.w
     latitude = math.radians(p.latitude_deg[i])
     w.cos_latitude[i], w.sin_latitude[i] = math.cos(latitude), math.sin(latitude)
@@ -157,7 +157,11 @@ def site_constants(b, i):
     w.frozen_ratio[i] = 1.0 + freezes * (p.soil_frozen_conductivity_ratio[i] - 1.0)
     w.half_surface[i] = 0.5 * surface
     w.above_deep_node[i] = p.deep_soil_node_m[i] - surface
-    w.below_deep_node[i] = p.boundary_depth_m[i] - p.deep_soil_node_m[i]
+    w.per_below_deep_node[i] = 1.0 / (p.boundary_depth_m[i] - p.deep_soil_node_m[i])
+
+    w.dryness_conifer[i] = 1.0 / (p.vpd_high_conifer_hpa[i] - p.vpd_low_hpa[i])
+    w.dryness_deciduous[i] = 1.0 / (p.vpd_high_deciduous_hpa[i] - p.vpd_low_hpa[i])
+    w.unloading_rate[i] = 1.0 / (3600.0 * p.snow_unloading_hours[i])
 
 
 @phase

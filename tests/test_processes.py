@@ -262,11 +262,12 @@ def test_snow_albedo_ages_to_old_and_is_renewed_by_snowfall():
 
 
 def test_snow_hides_the_ground():
-    assert snow.surface_albedo(0.0, 250.0, 0.1, 0.8, 0.2) == approx(0.2)
-    assert snow.surface_albedo(12.5, 250.0, 0.1, 0.8, 0.2) == approx(0.5)  # 12.5 mm of water in 5 cm of snow
+    per_mm = 1.0 / (250.0 * 0.1)  # hidden from 10 cm on
+    assert snow.surface_albedo(0.0, per_mm, 0.8, 0.2) == approx(0.2)
+    assert snow.surface_albedo(12.5, per_mm, 0.8, 0.2) == approx(0.5)  # 12.5 mm of water in 5 cm of snow
     assert (
-        snow.surface_albedo(25.0, 250.0, 0.1, 0.8, 0.2)
-        == snow.surface_albedo(90.0, 250.0, 0.1, 0.8, 0.2)
+        snow.surface_albedo(25.0, per_mm, 0.8, 0.2)
+        == snow.surface_albedo(90.0, per_mm, 0.8, 0.2)
         == approx(0.8)
     )
 
@@ -277,9 +278,13 @@ def test_ground_profile():
     assert share == approx(math.log(2.0 / 0.001) / math.log(10.0 / 0.001))
 
 
-@given(st.floats(1e-9, 1e6))
-def test_cube_root(x):
-    assert sim.mathematics.cube_root(x) == approx(x ** (1.0 / 3.0), rel=2e-15)
+@given(st.floats(1e-300, 1e6))
+def test_two_thirds_power(x):
+    assert mathematics.two_thirds_power(np.float64(x)) == approx(x ** (2.0 / 3.0), rel=2e-15)
+
+
+def test_two_thirds_power_of_nothing():
+    assert mathematics.two_thirds_power(np.float64(0.0)) == 0.0
 
 
 def test_stability():
@@ -365,7 +370,7 @@ def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
         source, emission, slope, emissivity, cover = *generator.uniform(0.0, 400.0, 2), 4.6, 0.97, generator.random()
         canopy_emission = generator.uniform(200.0, 400.0)
         (deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base, trunk_by_canopy, trunk_by_ground,
-         ground_base, ground_by_emission, ground_by_canopy, stiffness) = soil.respond_to_canopy(
+         ground_base, ground_by_emission, ground_by_canopy, stiffness, yielding) = soil.respond_to_canopy(
             trunk, trunk_inertia, canopy_trunk, trunk_air, trunk_ground,
             ground, ground_inertia, ground_air, source, emission, slope, vapour, emissivity, cover, air,
             surface, surface_inertia, ground_surface, deep, deep_inertia, surface_deep, below, boundary,
@@ -394,7 +399,8 @@ def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
             deep_inertia * deep + below * boundary,
         ]  # fmt: skip
         np.testing.assert_allclose(new, np.linalg.solve(matrix, right), rtol=1e-9, atol=1e-9)
-        assert 1.0 / stiffness == approx(np.linalg.inv(matrix)[1, 1])  # warming of the ground per W m-2 into it
+        assert yielding == 1.0 / stiffness
+        assert yielding == approx(np.linalg.inv(matrix)[1, 1])  # warming of the ground per W m-2 into it
 
 
 # ----------------------------------------------------------------------------------------------------- canopy
@@ -421,7 +427,7 @@ def test_aerodynamic_conductance():
 
 
 def test_stress_ramp():
-    assert [canopy.stress_ramp(v, -8.0, 8.0) for v in (-20.0, -8.0, 0.0, 8.0, 20.0)] == [0.0, 0.0, 0.5, 1.0, 1.0]
+    assert [canopy.stress_ramp(v, -8.0, 1.0 / 16.0) for v in (-20.0, -8.0, 0.0, 8.0, 20.0)] == [0.0, 0.0, 0.5, 1.0, 1.0]
 
 
 @pytest.mark.parametrize("melt_span", [0.0, 2.0, 1e3], ids=["no snow", "melts out", "deep snow"])
@@ -434,9 +440,11 @@ def test_slope_of_the_canopy_balance_is_its_derivative(trial, melt_span):
         )  # fmt: skip
 
     step = 1e-4
-    residual, slope, net, _ = balance(trial)
+    residual, slope, by_emission, net, _ = balance(trial)
     assert slope == approx((balance(trial + step)[0] - balance(trial - step)[0]) / (2.0 * step), rel=1e-6)
     assert slope < 0.0 < net
+    bend = (balance(trial + step)[1] - balance(trial - step)[1]) / (2.0 * step)
+    assert by_emission * 12.0 * 5.670374419e-8 * (trial + 273.15) ** 2 == approx(bend, rel=1e-6)
 
 
 def test_melting_snow_holds_the_ground_at_zero_until_it_is_gone():
@@ -444,16 +452,29 @@ def test_melting_snow_holds_the_ground_at_zero_until_it_is_gone():
         return canopy.canopy_balance(
             2.0, 0.0, 250.0, 280.0, 0.7, 0.98, 0.0, melt_span, bare_gain, base, 0.0, 0.0, 0.4, 0.3, 0.2, 1.4,
             6.0, 25.0, 0.4, 0.1, 8.0,
-        )[3]  # fmt: skip
+        )[4]  # fmt: skip
 
     assert [ground(base, 3.0, 1.5) for base in (-4.0, 0.0, 2.0, 3.0, 5.0)] == [-4.0, 0.0, 0.0, 0.0, 3.0]
     assert [ground(base, 0.0, 1.0) for base in (-4.0, 0.0, 5.0)] == [-4.0, 0.0, 5.0]
 
 
 def test_newton_takes_the_middle_where_its_step_leaves_the_bracket():
-    assert canopy.newton_step(1.0, 4.0, -2.0, -100.0, 100.0) == (3.0, 1.0, 100.0)
-    assert canopy.newton_step(1.0, -4.0, -2.0, -100.0, 100.0) == (-1.0, -100.0, 1.0)
-    assert canopy.newton_step(1.0, 4.0, -0.001, -100.0, 100.0) == (50.5, 1.0, 100.0)
+    assert canopy.newton_step(1.0, 4.0, -2.0, 0.0, -100.0, 100.0) == (3.0, 1.0, 100.0)
+    assert canopy.newton_step(1.0, -4.0, -2.0, 0.0, -100.0, 100.0) == (-1.0, -100.0, 1.0)
+    assert canopy.newton_step(1.0, 4.0, -0.001, 0.0, -100.0, 100.0) == (50.5, 1.0, 100.0)
+
+
+def test_newton_knows_the_curvature_of_the_emission():
+    """Where the residual is a line and an emission, one step leaves an error of its fourth power."""
+    emission, root = radiation.black_body, 3.0
+
+    def missed(trial):
+        residual = 20.0 * (root - trial) + 1.5 * (emission(root + 273.15) - emission(trial + 273.15))
+        slope = -20.0 - 1.5 * radiation.black_body_slope(trial + 273.15)
+        return abs(canopy.newton_step(trial, residual, slope, -1.5, -100.0, 100.0)[0] - root)
+
+    assert missed(2.0) < 1e-8
+    assert missed(1.0) == approx(16.0 * missed(2.0), rel=0.1)
 
 
 # ----------------------------------------------------------------------------------------------------- carbon
@@ -500,36 +521,39 @@ def test_snow_capacity():
     assert interception.snow_capacity(-30.0, 4.0, 4.4, 6.0) == approx(24.0)
 
 
-@given(st.floats(0.0, 50.0), st.floats(0.0, 30.0), st.floats(0.0, 30.0), share)
+@given(st.floats(0.0, 50.0), st.floats(0.0, 30.0), st.floats(0.0, 30.0, allow_subnormal=False), share)
 def test_no_more_is_intercepted_than_falls_and_fits(fall, store, capacity, efficiency):
-    held = interception.intercepted(fall, store, capacity, efficiency)
+    per_capacity = 1.0 / capacity if capacity > 0.0 else 0.0
+    held = interception.intercepted(fall, store, capacity, per_capacity, efficiency)
     assert 0.0 <= held <= fall
     assert held <= max(capacity - store, 0.0) + 1e-12
 
 
 def test_interception_shrinks_as_the_canopy_fills():
-    assert interception.intercepted(1.0, 0.0, 10.0, 0.6) == approx(0.6)
-    assert interception.intercepted(1.0, 5.0, 10.0, 0.6) == approx(0.3)
-    assert interception.intercepted(1.0, 10.0, 10.0, 0.6) == interception.intercepted(1.0, 0.0, 0.0, 0.6) == 0.0
+    assert interception.intercepted(1.0, 0.0, 10.0, 0.1, 0.6) == approx(0.6)
+    assert interception.intercepted(1.0, 5.0, 10.0, 0.1, 0.6) == approx(0.3)
+    assert interception.intercepted(1.0, 10.0, 10.0, 0.1, 0.6) == 0.0
+    assert interception.intercepted(1.0, 0.0, 0.0, 0.0, 0.6) == 0.0
 
 
 def test_sublimation_of_intercepted_snow():
     penman = (3.0 * 50.0 + 20.0 * 1.0) / (3.0 + 0.65)
-    mm = interception.snow_sublimation(5.0, 10.0, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0)
+    mm = interception.snow_sublimation(5.0, 0.1, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0)
     assert mm == approx(0.6 * 0.5 ** (2.0 / 3.0) * penman / 2.834e6 * 1800.0)
-    assert interception.snow_sublimation(1e-5, 1e-5, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0) == 1e-5
-    assert interception.snow_sublimation(5.0, 10.0, 0.6, -50.0, 20.0, -1.0, 3.0, 0.65, 2.834e6, 1800.0) == 0.0
+    assert interception.snow_sublimation(1e-5, 1e5, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0) == 1e-5
+    assert interception.snow_sublimation(5.0, 0.1, 0.6, -50.0, 20.0, -1.0, 3.0, 0.65, 2.834e6, 1800.0) == 0.0
     assert interception.snow_sublimation(0.0, 0.0, 0.6, 50.0, 20.0, 1.0, 3.0, 0.65, 2.834e6, 1800.0) == 0.0
 
 
 def test_melt_and_unloading_of_intercepted_snow():
-    assert interception.snow_melt(5.0, 10.0, -2.0, 20.0, 3.34e5, 1800.0) == 0.0
-    assert interception.snow_melt(5.0, 10.0, 2.0, 20.0, 3.34e5, 1800.0) == approx(0.5 * 40.0 / 3.34e5 * 1800.0)
-    assert interception.snow_melt(1e-6, 10.0, 9.0, 20.0, 3.34e5, 1800.0) == 1e-6
-    assert interception.unloaded(2.4, 10.0, 0.0, 240.0, 0.4, 3600.0) == approx(0.01)
-    assert interception.unloaded(2.4, 10.0, 1.0, 240.0, 0.4, 3600.0) == approx(0.41)
-    assert interception.unloaded(12.0, 10.0, 0.0, 240.0, 0.4, 3600.0) == approx(2.0)
-    assert interception.unloaded(1.0, 10.0, 9.0, 240.0, 0.4, 3600.0) == 1.0
+    assert interception.snow_melt(5.0, 0.1, -2.0, 20.0, 3.34e5, 1800.0) == 0.0
+    assert interception.snow_melt(5.0, 0.1, 2.0, 20.0, 3.34e5, 1800.0) == approx(0.5 * 40.0 / 3.34e5 * 1800.0)
+    assert interception.snow_melt(1e-6, 0.1, 9.0, 20.0, 3.34e5, 1800.0) == 1e-6
+    slowly = 1.0 / (240.0 * 3600.0)
+    assert interception.unloaded(2.4, 10.0, 0.0, slowly, 0.4, 3600.0) == approx(0.01)
+    assert interception.unloaded(2.4, 10.0, 1.0, slowly, 0.4, 3600.0) == approx(0.41)
+    assert interception.unloaded(12.0, 10.0, 0.0, slowly, 0.4, 3600.0) == approx(2.0)
+    assert interception.unloaded(1.0, 10.0, 9.0, slowly, 0.4, 3600.0) == 1.0
 
 
 def test_soil_bucket():
