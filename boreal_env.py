@@ -4,8 +4,9 @@
 The file reads top to bottom: observation, action mask, reward, episodes, the environment, the vector environment.
 """
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from numbers import Real
 
 import gymnasium as gym
 import numpy as np
@@ -221,18 +222,26 @@ def reward_components(record: np.ndarray, density_change: np.ndarray, reward: Re
     """Parts of the carbon reward of a year, each shape (n,); see `carbon_reward`.
 
     record : annual records (n, columns of `sim.RECORD_NAMES`); density_change : what was asked for [stems ha-1].
+    The change and the bonuses are clipped; `components_clipped` is what that cut off, all three together.
     """
     column = {name: record[:, i] for name, i in _COLUMN.items()}
-    stock = column["biomass_kgc_m2"] + column["soil_kgc_m2"]
+    change = column["net_carbon_change_kgc_m2"] / reward.carbon_scale
+    stock = (column["biomass_kgc_m2"] + column["soil_kgc_m2"]) / reward.stock_scale
+    products = column["hwp_stored_kgc_m2"] / reward.product_scale
+    gains = {
+        "carbon_change": np.clip(change, -1.0, 1.0),
+        "stock_bonus": reward.stock_bonus * np.clip(stock, 0.0, 1.0),
+        "product_bonus": reward.product_bonus * np.clip(products, 0.0, 1.0),
+    }
+    unclipped = change + reward.stock_bonus * stock + reward.product_bonus * products
     over_biomass = np.maximum(column["biomass_kgc_m2"] - reward.biomass_limit, 0.0)
     over_soil = np.maximum(column["soil_kgc_m2"] - reward.soil_limit, 0.0)
     made = column["planted_stems_ha"] - column["thinned_stems_ha"]
     shortfall = np.abs(density_change - made)
     missed = np.where(shortfall < NEGLIGIBLE_STEMS, 0.0, shortfall / np.maximum(np.abs(density_change), 1.0))
     return {
-        "carbon_change": np.clip(column["net_carbon_change_kgc_m2"] / reward.carbon_scale, -1.0, 1.0),
-        "stock_bonus": reward.stock_bonus * np.clip(stock / reward.stock_scale, 0.0, 1.0),
-        "product_bonus": reward.product_bonus * np.clip(column["hwp_stored_kgc_m2"] / reward.product_scale, 0.0, 1.0),
+        **gains,
+        "components_clipped": unclipped - sum(gains.values()),
         "biomass_limit_penalty": reward.limit_penalty * over_biomass / reward.biomass_limit,
         "soil_limit_penalty": reward.limit_penalty * over_soil / reward.soil_limit,
         "density_penalty": reward.density_penalty * (column["density_after_action"] >= reward.density_limit),
@@ -259,8 +268,9 @@ def thaw_reward(cooling: np.ndarray, warming: np.ndarray, reward: Reward, formul
 
 #: Columns that the environment adds to the annual record.
 REWARD_COLUMNS = (
-    "carbon_change", "stock_bonus", "product_bonus", "biomass_limit_penalty", "soil_limit_penalty", "density_penalty",
-    "ineffective_penalty", "carbon_clipped", "thaw_clipped", "carbon_reward", "thaw_reward",
+    "carbon_change", "stock_bonus", "product_bonus", "components_clipped", "biomass_limit_penalty",
+    "soil_limit_penalty", "density_penalty", "ineffective_penalty", "carbon_clipped", "thaw_clipped", "carbon_reward",
+    "thaw_reward",
 )  # fmt: skip
 
 
@@ -284,12 +294,68 @@ def rewards_of_year(record: np.ndarray, actions: np.ndarray, reward: Reward, for
     }
 
 
+#: Columns of the annual record with the rewards.
+HISTORY_NAMES = (*sim.RECORD_NAMES, *REWARD_COLUMNS)
+PAPER_OBJECTIVES = ("carbon", "thaw")
+
+
+@dataclass(frozen=True)
+class Objective:
+    """An objective of your own, beside the paper's "carbon" and "thaw".
+
+    value : function of the year's record, a dict of the columns `HISTORY_NAMES`, each (n,), to rewards (n,); for
+    worker processes and pickling, a function at the top level of a module. low, high : limits of the reward; values
+    are clipped to them. The record gets the columns `<name>_reward` and `<name>_clipped` (what was cut off), the last
+    step's info `<name>_return`.
+    """
+
+    name: str
+    value: Callable[[dict[str, np.ndarray]], np.ndarray]
+    low: float = -1.0
+    high: float = 1.0
+
+    def __post_init__(self):
+        taken = (*PAPER_OBJECTIVES, "components")
+        if not isinstance(self.name, str) or not self.name.isidentifier() or self.name in taken:
+            raise ValueError(f"objective name {self.name!r}: an identifier is allowed, not {', '.join(taken)}")
+        if not callable(self.value):
+            raise ValueError(f"objective {self.name}: a function of the year's record is allowed, got {self.value!r}")
+        limits = (self.low, self.high)
+        if not all(isinstance(x, Real) and np.isfinite(x) for x in limits) or self.low >= self.high:
+            raise ValueError(f"objective {self.name}: finite limits low < high are allowed, got {limits}")
+
+    def columns(self, year: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """`<name>_clipped` and `<name>_reward` of a year, each shape (n,)."""
+        value = np.asarray(self.value(year), dtype=float)
+        number = len(year["carbon_reward"])
+        if value.shape != (number,) or not np.isfinite(value).all():
+            raise ValueError(f"objective {self.name}: {number} finite numbers are allowed, got {value}")
+        reward = np.clip(value, self.low, self.high)
+        return {f"{self.name}_clipped": value - reward, f"{self.name}_reward": reward}
+
+
+def check_objectives(objectives: Sequence) -> tuple:
+    """Objectives of an environment: names of the paper's, and `Objective`s, each once."""
+    if isinstance(objectives, str) or not np.iterable(objectives) or not len(objectives):
+        raise ValueError(f"objectives: a sequence of {', '.join(PAPER_OBJECTIVES)} and Objective, got {objectives!r}")
+    for objective in objectives:
+        if not isinstance(objective, Objective):
+            _check_choice("objective", objective, PAPER_OBJECTIVES)
+    names = objective_names(objectives)
+    if len(set(names)) < len(names):
+        raise ValueError(f"objectives {', '.join(names)}: each is allowed once")
+    return tuple(objectives)
+
+
+def objective_names(objectives: Sequence) -> list[str]:
+    """Names of objectives, in the order of the reward vector."""
+    return [objective.name if isinstance(objective, Objective) else objective for objective in objectives]
+
+
 # ---------------------------------------------------------------------------------------------------------------
 # Episodes: what one environment and many in lockstep share
 # ---------------------------------------------------------------------------------------------------------------
 
-HISTORY_NAMES = (*sim.RECORD_NAMES, *REWARD_COLUMNS)
-_HISTORY = {name: i for i, name in enumerate(HISTORY_NAMES)}
 
 
 class _Episodes:
@@ -298,8 +364,8 @@ class _Episodes:
     def __init__(
         self, number, *, mode="generalist", years=DEFAULT_YEARS, time_step_minutes=30, backend="numba",
         thaw_formulation="asymmetric", fixed_preference=None, site_seed=None, parameter_overrides=None,
-        initial_ranges=None, hwp_half_life_years=None, harvest_min_class="young", reward=None, mechanisms=None,
-        constants=None, observation_groups=None, record_years=False,
+        initial_ranges=None, hwp_half_life_years=None, harvest_min_class="young", reward=None,
+        objectives=PAPER_OBJECTIVES, mechanisms=None, constants=None, observation_groups=None, record_years=False,
     ):  # fmt: skip
         _check_choice("mode", mode, MODES)
         _check_choice("thaw_formulation", thaw_formulation, THAW_FORMULATIONS)
@@ -318,6 +384,14 @@ class _Episodes:
         self.initial_ranges = check_initial_ranges(initial_ranges)
         self.harvest_min_class = harvest_min_class
         self.reward = Reward.of(reward)
+        objectives = check_objectives(objectives)
+        self.objective_names = objective_names(objectives)
+        self.own_objectives = [objective for objective in objectives if isinstance(objective, Objective)]
+        self.history_names = HISTORY_NAMES + tuple(
+            f"{objective.name}_{what}" for objective in self.own_objectives for what in ("clipped", "reward")
+        )
+        limits = [(o.low, o.high) if isinstance(o, Objective) else (-1.0, 1.0) for o in objectives]
+        self.reward_space = Box(*np.array(limits, dtype=np.float32).T, dtype=np.float32)
         self.record_years = bool(record_years)
         self.stands = sim.Stands(
             number, time_step_minutes=time_step_minutes, backend=backend, constants=constants, mechanisms=mechanisms,
@@ -338,7 +412,7 @@ class _Episodes:
         self.episode_seeds = np.zeros(number, dtype=np.int64)
         self.year = np.zeros(number, dtype=int)
         self.running = np.zeros(number, dtype=bool)
-        self.history = np.zeros((number, self.years, len(HISTORY_NAMES)))
+        self.history = np.zeros((number, self.years, len(self.history_names)))
         self._observation = np.zeros((number, len(OBSERVATION)))
 
     def draw(self, generator: np.random.Generator) -> tuple[int, int, float]:
@@ -372,7 +446,7 @@ class _Episodes:
         self._observe_start(np.asarray(indices), chosen)
 
     def advance(self, actions) -> np.ndarray:
-        """A year for all episodes; returns float32 rewards (number, 2)."""
+        """A year for all episodes; returns float32 rewards (number, objectives)."""
         if not self.running.all():
             stopped = int(np.argmin(self.running))
             raise RuntimeError(f"step on episode {stopped} that is not running: call reset first")
@@ -380,12 +454,14 @@ class _Episodes:
         before = self.conifer_fraction()
         record = self.stands.step(actions)
         parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
-        year = self.year
-        self.history[np.arange(self.number), year] = np.column_stack([record, *(parts[n] for n in REWARD_COLUMNS)])
-        self.year = year + 1
+        columns = dict(zip(sim.RECORD_NAMES, record.T, strict=True)) | parts
+        for objective in self.own_objectives:
+            columns |= objective.columns(columns)
+        self.history[np.arange(self.number), self.year] = np.column_stack([columns[n] for n in self.history_names])
+        self.year = self.year + 1
         self.running = self.year < self.years
         self._observe_year(record, actions, before, parts)
-        return np.stack([parts["carbon_reward"], parts["thaw_reward"]], axis=1).astype(np.float32)
+        return np.stack([columns[f"{name}_reward"] for name in self.objective_names], axis=1).astype(np.float32)
 
     def observations(self) -> np.ndarray:
         """Fresh float32 observations, shape (number, entries)."""
@@ -398,28 +474,28 @@ class _Episodes:
 
     def final_info(self, i: int) -> dict:
         """Totals of a finished episode."""
-        years = self.history[i, : self.year[i]]
+        years = dict(zip(self.history_names, self.history[i, : self.year[i]].T, strict=True))
 
         def mean(name):
-            return float(years[:, _HISTORY[name]].mean())
+            return float(years[name].mean())
 
+        names = (*PAPER_OBJECTIVES, *(objective.name for objective in self.own_objectives))
         info = {
-            "carbon_return": float(years[:, _HISTORY["carbon_reward"]].sum()),
-            "thaw_return": float(years[:, _HISTORY["thaw_reward"]].sum()),
+            **{f"{name}_return": float(years[f"{name}_reward"].sum()) for name in names},
             "site_seed": int(self.site_seeds[i]),
             "episode_seed": int(self.episode_seeds[i]),
             "preference": float(self.preference[i]),
-            "final_density": float(years[-1, _HISTORY["density_stems_ha"]]),
+            "final_density": float(years["density_stems_ha"][-1]),
             "mean_density": mean("density_stems_ha"),
-            "final_conifer_fraction": float(years[-1, _HISTORY["conifer_fraction"]]),
+            "final_conifer_fraction": float(years["conifer_fraction"][-1]),
             "mean_conifer_fraction": mean("conifer_fraction"),
             "growing_season_days": mean("growing_season_days"),
             "latent_heat_mj_m2": mean("latent_heat_mj_m2"),
             "ground_shortwave_mj_m2": mean("ground_shortwave_mj_m2"),
         }
         if self.record_years:
-            record = {name: years[:, k].copy() for name, k in _HISTORY.items()}
-            info["years"] = {"year": np.arange(1, len(years) + 1), **record}
+            record = {name: column.copy() for name, column in years.items()}
+            info["years"] = {"year": np.arange(1, self.year[i] + 1), **record}
         return info
 
     def _observe_start(self, indices, sites) -> None:
@@ -488,10 +564,10 @@ class _Episodes:
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
-        there, here = ((kind, *history.shape[:2]) for kind, history in
+        there, here = ((kind, *history.shape) for kind, history in
                        ((state["mode"], state["history"]), (self.mode, self.history)))  # fmt: skip
         if there != here:
-            raise ValueError(f"state of (mode, episodes, years) {there} given to {here}")
+            raise ValueError(f"state of (mode, episodes, years, columns of the record) {there} given to {here}")
         self.stands.set_state(state["stands"])
         for name, value in state.items():
             if name not in ("mode", "stands"):
@@ -566,7 +642,8 @@ class BorealEnv(gym.Env, EzPickle):
 
     ## Reward Space
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, soil and wood products over `carbon_scale`,
-    less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2.
+    less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2. Another
+    objective is a function of the year's record: `objectives=("carbon", "thaw", Objective("timber", value, 0, 1))`.
 
     ## Starting State
     Site, first stocks and ages, weather and preference are drawn anew in generalist mode, and are fixed in
@@ -588,6 +665,7 @@ class BorealEnv(gym.Env, EzPickle):
     - `hwp_half_life_years`: half-life of wood products (None: for ever)
     - `harvest_min_class`: youngest class that may be cut: "young", "mature" or "old"
     - `reward`: a `Reward` or a dict of its constants
+    - `objectives`: of the reward vector, "carbon", "thaw" and any `Objective` of your own
     - `mechanisms`: switches of the physics, see `sim.MECHANISMS`
     - `constants`: literature constants to override, see `sim/constants.csv`
     - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`
@@ -611,8 +689,8 @@ class BorealEnv(gym.Env, EzPickle):
         self._episodes = _Episodes(1, **_known(kwargs))
         self.observation_space = observation_space(self._episodes.entries)
         self.action_space = Discrete(NUM_ACTIONS)
-        self.reward_space = Box(-1.0, 1.0, (2,), np.float32)
-        self.reward_dim = 2
+        self.reward_space = self._episodes.reward_space
+        self.reward_dim = len(self._episodes.objective_names)
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Start an episode. options: "preference" (weight of carbon) and "site" (parameter -> value)."""
@@ -662,7 +740,7 @@ class BorealEnv(gym.Env, EzPickle):
 # ---------------------------------------------------------------------------------------------------------------
 
 
-class BorealVectorEnv(VectorEnv):
+class BorealVectorEnv(VectorEnv, EzPickle):
     """`num_envs` environments in lockstep, without worker processes; arguments as for `BorealEnv`.
 
     With the same seeds and actions it gives the trajectories of `num_envs` single environments. Episodes that end
@@ -674,6 +752,7 @@ class BorealVectorEnv(VectorEnv):
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
 
     def __init__(self, num_envs: int = 1, *, group_size: int = 1, render_mode: str | None = None, **kwargs):
+        EzPickle.__init__(self, num_envs, group_size=group_size, render_mode=render_mode, **kwargs)
         if render_mode is not None:
             raise ValueError(f"render_mode {render_mode!r}: the vector environment draws nothing; None is allowed")
         if isinstance(num_envs, bool) or not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
@@ -688,8 +767,8 @@ class BorealVectorEnv(VectorEnv):
         self.single_action_space = Discrete(NUM_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.reward_space = Box(-1.0, 1.0, (2,), np.float32)
-        self.reward_dim = 2
+        self.reward_space = self._episodes.reward_space
+        self.reward_dim = len(self._episodes.objective_names)
         self._generators: list[np.random.Generator] | None = None
 
     def reset(self, *, seed=None, options: dict | None = None):
