@@ -802,7 +802,7 @@ class BorealVectorEnv(VectorEnv, EzPickle):
         if ended.any():
             indices = np.flatnonzero(ended)
             for i in indices:
-                final = {"final_obs": observations[i].copy(), "final_info": self._episodes.final_info(i)}
+                final = {"final_info": self._episodes.final_info(i), "final_obs": observations[i].copy()}
                 infos = self._add_info(infos, final, i)
             nothing = [None] * self.num_envs
             self._begin(indices, nothing, nothing)

@@ -29,8 +29,8 @@ mo-gymnasium's and other libraries is in [clients.md](clients.md); where the pap
 {inspect.getdoc(BorealVectorEnv)}
 
 ## Observation, entry by entry
-`boreal_env.OBSERVATION`, in the paper's order. The agent sees the normalised value; limits are those of the value *x* in
-its unit, from physics. Of the stand and the year just past unless a name ends in `2yr`; `site_` entries are the 62
+`boreal_env.OBSERVATION`, in the paper's order. The agent sees the normalised value; limits are those of the value *x*
+in its unit, from physics. Names that end in `2yr` are of the year before last. The `site_` entries are the 62
 parameters of `sim/site_parameters.csv`, scaled by the ranges that they are sampled from.
 
 {table(("index", "name", "unit", "normalised", "limits", "group"), map(observation_row, enumerate(OBSERVATION)))}
