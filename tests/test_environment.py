@@ -170,21 +170,21 @@ def test_pickle_of_the_vector_environment_keeps_the_arguments():
 
 
 def test_memory_is_bounded_over_any_number_of_episodes():
-    env = quick(years=8, time_step_minutes=1440, record_years=True)
+    env = quick(years=20, time_step_minutes=1440, record_years=True)
 
     def memory_after(seeds):
         for seed in seeds:
-            play(env, [24, 0] * 4, seed=seed)
+            play(env, [24, 0] * 10, seed=seed)
         gc.collect()
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()
     try:
-        before = memory_after(range(10))
-        growth = memory_after(range(10, 40)) - before
+        before = memory_after(range(4))
+        growth = memory_after(range(4, 12)) - before
     finally:
         tracemalloc.stop()
-    assert growth < 10 * env._episodes.history.nbytes  # of thirty episodes' records
+    assert growth < 4 * env._episodes.history.nbytes  # of eight episodes' records
 
 
 # -------------------------------------------------------------------------------------------------- the spaces
