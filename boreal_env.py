@@ -119,14 +119,19 @@ OBSERVATION_GROUPS = tuple(dict.fromkeys(entry.group for entry in OBSERVATION))
 _SHIFT = np.array([entry.shift for entry in OBSERVATION])
 _SCALE = np.array([entry.scale for entry in OBSERVATION])
 _AGE = slice(OBSERVATION_NAMES.index("conifer_seedling"), OBSERVATION_NAMES.index("deciduous_old") + 1)
+_PENALTIES = slice(OBSERVATION_NAMES.index("biomass_limit_penalty"), OBSERVATION_NAMES.index("density_penalty") + 1)
 _SITE = slice(OBSERVATION_NAMES.index(f"site_{next(iter(sim.SITE_PARAMETERS))}"), len(OBSERVATION))
 _COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
 
 
-def observation_space(entries: Sequence[int]) -> Box:
-    """Box of the given entries of the table, with bounds from physical limits, widened for float32 rounding."""
-    low = np.array([(OBSERVATION[i].low + OBSERVATION[i].shift) / OBSERVATION[i].scale for i in entries])
-    high = np.array([(OBSERVATION[i].high + OBSERVATION[i].shift) / OBSERVATION[i].scale for i in entries])
+def observation_space(entries: Sequence[int], largest_penalties: Sequence[float] = (0.0, 0.0, 0.0)) -> Box:
+    """Box of the given entries of the table, with bounds from physical limits, widened for float32 rounding.
+
+    largest_penalties : of biomass, soil and density, which a user's constants can raise above the table's limits.
+    """
+    limits = np.array([(entry.low, entry.high) for entry in OBSERVATION])
+    limits[_PENALTIES, 1] = np.maximum(limits[_PENALTIES, 1], largest_penalties)
+    low, high = ((limits + _SHIFT[:, None]) / _SCALE[:, None])[entries].T
     margin = 1e-4 * (high - low)
     return Box((low - margin).astype(np.float32), (high + margin).astype(np.float32), dtype=np.float32)
 
@@ -203,6 +208,11 @@ class Reward:
                 raise ValueError(
                     f"reward {field.name} = {value}: a {'positive' if positive else 'non-negative'} number is allowed"
                 )
+
+    def largest_penalties(self) -> tuple[float, float, float]:
+        """Of biomass, soil and density, at the largest stocks that can be observed."""
+        biomass, soil = (max(_STOCK / limit - 1.0, 0.0) for limit in (self.biomass_limit, self.soil_limit))
+        return self.limit_penalty * biomass, self.limit_penalty * soil, self.density_penalty
 
     @staticmethod
     def of(values) -> "Reward":
@@ -407,6 +417,7 @@ class _Episodes:
         self.entries = [i for i, entry in enumerate(OBSERVATION) if entry.group in groups]
         if not self.entries:
             raise ValueError(f"observation_groups = {observation_groups!r}: nothing is left to observe in mode {mode}")
+        self.observation_space = observation_space(self.entries, self.reward.largest_penalties())
         self.preference = np.zeros(number)
         self.site_seeds = np.zeros(number, dtype=np.int64)
         self.episode_seeds = np.zeros(number, dtype=np.int64)
@@ -687,7 +698,7 @@ class BorealEnv(gym.Env, EzPickle):
             _check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self._episodes = _Episodes(1, **_known(kwargs))
-        self.observation_space = observation_space(self._episodes.entries)
+        self.observation_space = self._episodes.observation_space
         self.action_space = Discrete(NUM_ACTIONS)
         self.reward_space = self._episodes.reward_space
         self.reward_dim = len(self._episodes.objective_names)
@@ -763,7 +774,7 @@ class BorealVectorEnv(VectorEnv, EzPickle):
             raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
         self.num_envs, self.group_size = int(num_envs), int(group_size)
         self._episodes = _Episodes(self.num_envs, **_known(kwargs))
-        self.single_observation_space = observation_space(self._episodes.entries)
+        self.single_observation_space = self._episodes.observation_space
         self.single_action_space = Discrete(NUM_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)

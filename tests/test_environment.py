@@ -216,6 +216,15 @@ def test_physical_limits_of_the_site_lie_in_the_observation_space(corner):
     np.testing.assert_allclose(observation[SITE], expected, rtol=1e-5)
 
 
+def test_penalties_of_heavy_constants_lie_in_the_observation_space():
+    reward = {"biomass_limit": 0.001, "soil_limit": 0.001, "density_penalty": 500.0}
+    env = quick(reward=reward, initial_ranges={"density_stems_ha": (2100.0, 2200.0)})
+    env.reset(seed=1)
+    observation = env.step(24)[0]
+    assert observation in env.observation_space
+    assert (observation[40:43] > quick().observation_space.high[40:43]).tolist() == [True, True, True]
+
+
 def test_arrays_are_fresh_every_step():
     env = quick()
     first, _ = env.reset(seed=1)
