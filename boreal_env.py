@@ -156,6 +156,8 @@ def action_masks(observations: np.ndarray, harvest_min_class: str = "young") -> 
     observations = np.atleast_2d(np.asarray(observations, dtype=float))
     if observations.ndim != 2 or observations.shape[1] < _AGE.stop:
         raise ValueError(f"observations of shape {observations.shape}: (n, {_AGE.stop} or more) is allowed")
+    if not np.isfinite(observations[:, 2]).all() or not np.isfinite(observations[:, _AGE]).all():
+        raise ValueError("observations: finite densities and age fractions are allowed, got NaN or infinity")
     density = observations[:, 2] * 1500.0
     fractions = observations[:, _AGE].reshape(-1, 2, len(AGE_CLASSES))
     harvestable = density * fractions[:, :, AGE_CLASSES.index(harvest_min_class) :].sum(axis=(1, 2))
@@ -479,6 +481,17 @@ class _Episodes:
         self._observation[:, 0] = self.preference
         return self._observation[:, self.entries].astype(np.float32)
 
+    def action_masks(self) -> np.ndarray:
+        """Actions that can be carried out in full, bool, shape (number, 25)."""
+        self.check_begun("action_masks")
+        return action_masks(self._observation.astype(np.float32), self.harvest_min_class)
+
+    def check_begun(self, what: str) -> None:
+        """Refuse what needs a stand before the first reset."""
+        fresh = ~self.running & (self.year == 0)
+        if fresh.any():
+            raise RuntimeError(f"{what} of episode {int(np.argmax(fresh))} that has not begun: call reset first")
+
     def conifer_fraction(self) -> np.ndarray:
         """Conifers among the stems now, shape (number,)."""
         return self._observation[:, 3].copy()
@@ -604,6 +617,13 @@ def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict
     return dict(options or {})
 
 
+def check_saved(state: dict, keys: Sequence[str]) -> None:
+    """A dict that `get_state` of the same kind of environment gave."""
+    if not isinstance(state, dict) or set(state) != set(keys):
+        got = sorted(state) if isinstance(state, dict) else type(state).__name__
+        raise ValueError(f"state: a dict of {', '.join(keys)} from get_state is allowed, got {got}")
+
+
 ARGUMENTS = tuple(name for name in inspect.signature(_Episodes).parameters if name != "number")
 
 
@@ -725,13 +745,13 @@ class BorealEnv(gym.Env, EzPickle):
 
     def action_masks(self) -> np.ndarray:
         """Actions that can be carried out in full, bool, shape (25,)."""
-        observation = (self._episodes._observation).astype(np.float32)
-        return action_masks(observation, self._episodes.harvest_min_class)[0]
+        return self._episodes.action_masks()[0]
 
     def render(self):
         """A picture of the stand, uint8 (height, width, 3), with `render_mode="rgb_array"`; otherwise None."""
         if self.render_mode is None:
             return None
+        self._episodes.check_begun("picture")
         from analysis.drawing import draw_stand
 
         return draw_stand(self._episodes, 0)
@@ -742,6 +762,7 @@ class BorealEnv(gym.Env, EzPickle):
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
+        check_saved(state, ("episodes", "generator"))
         self._episodes.set_state(state["episodes"])
         self.np_random.bit_generator.state = state["generator"]
 
@@ -794,8 +815,8 @@ class BorealVectorEnv(VectorEnv, EzPickle):
         sites = _spread("site", options.get("site"), self.num_envs)
         for site in sites:
             sim.middle_site(site)
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else seed
-        seeds = _spread("seed", seeds, self.num_envs)
+        one = isinstance(seed, (int, np.integer)) and not isinstance(seed, bool)
+        seeds = _spread("seed", [seed + i for i in range(self.num_envs)] if one else seed, self.num_envs)
         if self._generators is None:
             self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
         for i, value in enumerate(seeds):
@@ -822,7 +843,7 @@ class BorealVectorEnv(VectorEnv, EzPickle):
 
     def action_masks(self) -> np.ndarray:
         """Actions that can be carried out in full, bool, shape (num_envs, 25)."""
-        return action_masks(self._episodes._observation.astype(np.float32), self._episodes.harvest_min_class)
+        return self._episodes.action_masks()
 
     def call(self, name: str, *args, **kwargs) -> tuple:
         """A method of every environment, as with gymnasium's AsyncVectorEnv: here `action_masks` only."""
@@ -836,6 +857,7 @@ class BorealVectorEnv(VectorEnv, EzPickle):
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
+        check_saved(state, ("episodes", "generators"))
         self._episodes.set_state(state["episodes"])
         self._generators = state["generators"] and [np.random.default_rng(0) for _ in range(self.num_envs)]
         for generator, value in zip(self._generators or [], state["generators"] or [], strict=True):

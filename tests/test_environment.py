@@ -776,6 +776,13 @@ def test_the_penalty_is_half_the_share_that_could_not_be_made():
     assert info["years"]["density_penalty"][0] == 1.0  # 2000 stems after planting
 
 
+def test_masks_of_nan_are_refused():
+    observations = np.zeros((2, 43))
+    observations[1, INDEX["density"]] = NAN
+    with pytest.raises(ValueError, match="observations: finite densities"):
+        boreal_env.action_masks(observations)
+
+
 @pytest.mark.parametrize("observations", [np.zeros((2, 10)), np.zeros((2, 2, 105)), np.zeros(0)], ids=str)
 def test_masks_of_arrays_that_are_no_observations_are_refused(observations):
     with pytest.raises(ValueError, match=r"observations.*\(n, "):
@@ -1120,6 +1127,38 @@ def test_step_before_reset_is_refused(make):
         make().step([12] if isinstance(make(), BorealVectorEnv) else 12)
 
 
+@pytest.mark.parametrize("make", [quick, lambda **kwargs: quick_vector(2, **kwargs)], ids=["single", "vector"])
+def test_masks_before_reset_are_refused(make):
+    with pytest.raises(RuntimeError, match="action_masks of episode 0 that has not begun: call reset first"):
+        make().action_masks()
+
+
+def test_a_picture_before_reset_is_refused():
+    with pytest.raises(RuntimeError, match="picture of episode 0 that has not begun: call reset first"):
+        quick(render_mode="rgb_array").render()
+
+
+def test_masks_stay_after_the_end():
+    env = quick(years=2)
+    observations, *_ = play(env, [24, 24], seed=1)
+    np.testing.assert_array_equal(env.action_masks(), boreal_env.action_masks(observations[-1])[0])
+
+
+@pytest.mark.parametrize(("state", "got"), [({}, r"\[\]"), (None, "NoneType"), ({"generator": 1}, r"\['generator'\]")])
+def test_what_is_no_state_is_refused(state, got):
+    for env in (quick(), quick_vector(2)):
+        with pytest.raises(ValueError, match=rf"state: a dict of episodes, generators?.* got {got}"):
+            env.set_state(state)
+
+
+def test_the_state_of_a_vector_environment_is_not_that_of_one():
+    one, envs = quick(), quick_vector(1)
+    one.reset(seed=1), envs.reset(seed=1)
+    for env, state in ((one, envs.get_state()), (envs, one.get_state())):
+        with pytest.raises(ValueError, match="state: a dict of episodes"):
+            env.set_state(state)
+
+
 def test_step_after_the_end_is_refused():
     env = quick()
     play(env, [12] * 4, seed=1)
@@ -1148,7 +1187,7 @@ def test_reset_refuses(options, message):
             env.reset(seed=1, options=options)
 
 
-@pytest.mark.parametrize("seed", [-1, 1.5, "one", [1, 2.5], [1, -2]])
+@pytest.mark.parametrize("seed", [-1, 1.5, "one", True, [1, 2.5], [1, -2]])
 def test_bad_seeds_are_refused(seed):
     with pytest.raises((ValueError, gym.error.Error), match="(?i)seed"):
         quick_vector(2).reset(seed=seed)
