@@ -778,7 +778,8 @@ class BorealVectorEnv(VectorEnv, EzPickle):
     With the same seeds and actions it gives the trajectories of `num_envs` single environments. Episodes that end
     start anew within the step (`AutoresetMode.SAME_STEP`); infos then have `final_obs` and `final_info`.
     `group_size` neighbours share site, start, weather and disturbance dice in every episode, not the preference.
-    `reset(options={"preference": one or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`.
+    `reset(options={"preference": one or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`, where
+    only stands of the mask start anew.
     """
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
