@@ -4,8 +4,9 @@
 The file reads top to bottom: observation, action mask, reward, episodes, the environment, the vector environment.
 """
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from numbers import Real
 
 import gymnasium as gym
 import numpy as np
@@ -118,14 +119,19 @@ OBSERVATION_GROUPS = tuple(dict.fromkeys(entry.group for entry in OBSERVATION))
 _SHIFT = np.array([entry.shift for entry in OBSERVATION])
 _SCALE = np.array([entry.scale for entry in OBSERVATION])
 _AGE = slice(OBSERVATION_NAMES.index("conifer_seedling"), OBSERVATION_NAMES.index("deciduous_old") + 1)
+_PENALTIES = slice(OBSERVATION_NAMES.index("biomass_limit_penalty"), OBSERVATION_NAMES.index("density_penalty") + 1)
 _SITE = slice(OBSERVATION_NAMES.index(f"site_{next(iter(sim.SITE_PARAMETERS))}"), len(OBSERVATION))
 _COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
 
 
-def observation_space(entries: Sequence[int]) -> Box:
-    """Box of the given entries of the table, with bounds from physical limits, widened for float32 rounding."""
-    low = np.array([(OBSERVATION[i].low + OBSERVATION[i].shift) / OBSERVATION[i].scale for i in entries])
-    high = np.array([(OBSERVATION[i].high + OBSERVATION[i].shift) / OBSERVATION[i].scale for i in entries])
+def observation_space(entries: Sequence[int], largest_penalties: Sequence[float] = (0.0, 0.0, 0.0)) -> Box:
+    """Box of the given entries of the table, with bounds from physical limits, widened for float32 rounding.
+
+    largest_penalties : of biomass, soil and density, which a user's constants can raise above the table's limits.
+    """
+    limits = np.array([(entry.low, entry.high) for entry in OBSERVATION])
+    limits[_PENALTIES, 1] = np.maximum(limits[_PENALTIES, 1], largest_penalties)
+    low, high = ((limits + _SHIFT[:, None]) / _SCALE[:, None])[entries].T
     margin = 1e-4 * (high - low)
     return Box((low - margin).astype(np.float32), (high + margin).astype(np.float32), dtype=np.float32)
 
@@ -150,6 +156,8 @@ def action_masks(observations: np.ndarray, harvest_min_class: str = "young") -> 
     observations = np.atleast_2d(np.asarray(observations, dtype=float))
     if observations.ndim != 2 or observations.shape[1] < _AGE.stop:
         raise ValueError(f"observations of shape {observations.shape}: (n, {_AGE.stop} or more) is allowed")
+    if not np.isfinite(observations[:, 2]).all() or not np.isfinite(observations[:, _AGE]).all():
+        raise ValueError("observations: finite densities and age fractions are allowed, got NaN or infinity")
     density = observations[:, 2] * 1500.0
     fractions = observations[:, _AGE].reshape(-1, 2, len(AGE_CLASSES))
     harvestable = density * fractions[:, :, AGE_CLASSES.index(harvest_min_class) :].sum(axis=(1, 2))
@@ -203,6 +211,11 @@ class Reward:
                     f"reward {field.name} = {value}: a {'positive' if positive else 'non-negative'} number is allowed"
                 )
 
+    def largest_penalties(self) -> tuple[float, float, float]:
+        """Of biomass, soil and density, at the largest stocks that can be observed."""
+        biomass, soil = (max(_STOCK / limit - 1.0, 0.0) for limit in (self.biomass_limit, self.soil_limit))
+        return self.limit_penalty * biomass, self.limit_penalty * soil, self.density_penalty
+
     @staticmethod
     def of(values) -> "Reward":
         """A Reward from a Reward, a dict of constants to change, or None."""
@@ -221,18 +234,26 @@ def reward_components(record: np.ndarray, density_change: np.ndarray, reward: Re
     """Parts of the carbon reward of a year, each shape (n,); see `carbon_reward`.
 
     record : annual records (n, columns of `sim.RECORD_NAMES`); density_change : what was asked for [stems ha-1].
+    The change and the bonuses are clipped; `components_clipped` is what that cut off, all three together.
     """
     column = {name: record[:, i] for name, i in _COLUMN.items()}
-    stock = column["biomass_kgc_m2"] + column["soil_kgc_m2"]
+    change = column["net_carbon_change_kgc_m2"] / reward.carbon_scale
+    stock = (column["biomass_kgc_m2"] + column["soil_kgc_m2"]) / reward.stock_scale
+    products = column["hwp_stored_kgc_m2"] / reward.product_scale
+    gains = {
+        "carbon_change": np.clip(change, -1.0, 1.0),
+        "stock_bonus": reward.stock_bonus * np.clip(stock, 0.0, 1.0),
+        "product_bonus": reward.product_bonus * np.clip(products, 0.0, 1.0),
+    }
+    unclipped = change + reward.stock_bonus * stock + reward.product_bonus * products
     over_biomass = np.maximum(column["biomass_kgc_m2"] - reward.biomass_limit, 0.0)
     over_soil = np.maximum(column["soil_kgc_m2"] - reward.soil_limit, 0.0)
     made = column["planted_stems_ha"] - column["thinned_stems_ha"]
     shortfall = np.abs(density_change - made)
     missed = np.where(shortfall < NEGLIGIBLE_STEMS, 0.0, shortfall / np.maximum(np.abs(density_change), 1.0))
     return {
-        "carbon_change": np.clip(column["net_carbon_change_kgc_m2"] / reward.carbon_scale, -1.0, 1.0),
-        "stock_bonus": reward.stock_bonus * np.clip(stock / reward.stock_scale, 0.0, 1.0),
-        "product_bonus": reward.product_bonus * np.clip(column["hwp_stored_kgc_m2"] / reward.product_scale, 0.0, 1.0),
+        **gains,
+        "components_clipped": unclipped - sum(gains.values()),
         "biomass_limit_penalty": reward.limit_penalty * over_biomass / reward.biomass_limit,
         "soil_limit_penalty": reward.limit_penalty * over_soil / reward.soil_limit,
         "density_penalty": reward.density_penalty * (column["density_after_action"] >= reward.density_limit),
@@ -259,8 +280,9 @@ def thaw_reward(cooling: np.ndarray, warming: np.ndarray, reward: Reward, formul
 
 #: Columns that the environment adds to the annual record.
 REWARD_COLUMNS = (
-    "carbon_change", "stock_bonus", "product_bonus", "biomass_limit_penalty", "soil_limit_penalty", "density_penalty",
-    "ineffective_penalty", "carbon_clipped", "thaw_clipped", "carbon_reward", "thaw_reward",
+    "carbon_change", "stock_bonus", "product_bonus", "components_clipped", "biomass_limit_penalty",
+    "soil_limit_penalty", "density_penalty", "ineffective_penalty", "carbon_clipped", "thaw_clipped", "carbon_reward",
+    "thaw_reward",
 )  # fmt: skip
 
 
@@ -284,12 +306,68 @@ def rewards_of_year(record: np.ndarray, actions: np.ndarray, reward: Reward, for
     }
 
 
+#: Columns of the annual record with the rewards.
+HISTORY_NAMES = (*sim.RECORD_NAMES, *REWARD_COLUMNS)
+PAPER_OBJECTIVES = ("carbon", "thaw")
+
+
+@dataclass(frozen=True)
+class Objective:
+    """An objective of your own, beside the paper's "carbon" and "thaw".
+
+    value : function of the year's record, a dict of the columns `HISTORY_NAMES`, each (n,), to rewards (n,); for
+    worker processes and pickling, a function at the top level of a module. low, high : limits of the reward; values
+    are clipped to them. The record gets the columns `<name>_reward` and `<name>_clipped` (what was cut off), the last
+    step's info `<name>_return`.
+    """
+
+    name: str
+    value: Callable[[dict[str, np.ndarray]], np.ndarray]
+    low: float = -1.0
+    high: float = 1.0
+
+    def __post_init__(self):
+        taken = (*PAPER_OBJECTIVES, "components")
+        if not isinstance(self.name, str) or not self.name.isidentifier() or self.name in taken:
+            raise ValueError(f"objective name {self.name!r}: an identifier is allowed, not {', '.join(taken)}")
+        if not callable(self.value):
+            raise ValueError(f"objective {self.name}: a function of the year's record is allowed, got {self.value!r}")
+        limits = (self.low, self.high)
+        if not all(isinstance(x, Real) and np.isfinite(x) for x in limits) or self.low >= self.high:
+            raise ValueError(f"objective {self.name}: finite limits low < high are allowed, got {limits}")
+
+    def columns(self, year: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """`<name>_clipped` and `<name>_reward` of a year, each shape (n,)."""
+        value = np.asarray(self.value(year), dtype=float)
+        number = len(year["carbon_reward"])
+        if value.shape != (number,) or not np.isfinite(value).all():
+            raise ValueError(f"objective {self.name}: {number} finite numbers are allowed, got {value}")
+        reward = np.clip(value, self.low, self.high)
+        return {f"{self.name}_clipped": value - reward, f"{self.name}_reward": reward}
+
+
+def check_objectives(objectives: Sequence) -> tuple:
+    """Objectives of an environment: names of the paper's, and `Objective`s, each once."""
+    if isinstance(objectives, str) or not np.iterable(objectives) or not len(objectives):
+        raise ValueError(f"objectives: a sequence of {', '.join(PAPER_OBJECTIVES)} and Objective, got {objectives!r}")
+    for objective in objectives:
+        if not isinstance(objective, Objective):
+            _check_choice("objective", objective, PAPER_OBJECTIVES)
+    names = objective_names(objectives)
+    if len(set(names)) < len(names):
+        raise ValueError(f"objectives {', '.join(names)}: each is allowed once")
+    return tuple(objectives)
+
+
+def objective_names(objectives: Sequence) -> list[str]:
+    """Names of objectives, in the order of the reward vector."""
+    return [objective.name if isinstance(objective, Objective) else objective for objective in objectives]
+
+
 # ---------------------------------------------------------------------------------------------------------------
 # Episodes: what one environment and many in lockstep share
 # ---------------------------------------------------------------------------------------------------------------
 
-HISTORY_NAMES = (*sim.RECORD_NAMES, *REWARD_COLUMNS)
-_HISTORY = {name: i for i, name in enumerate(HISTORY_NAMES)}
 
 
 class _Episodes:
@@ -298,8 +376,8 @@ class _Episodes:
     def __init__(
         self, number, *, mode="generalist", years=DEFAULT_YEARS, time_step_minutes=30, backend="numba",
         thaw_formulation="asymmetric", fixed_preference=None, site_seed=None, parameter_overrides=None,
-        initial_ranges=None, hwp_half_life_years=None, harvest_min_class="young", reward=None, mechanisms=None,
-        constants=None, observation_groups=None, record_years=False,
+        initial_ranges=None, hwp_half_life_years=None, harvest_min_class="young", reward=None,
+        objectives=PAPER_OBJECTIVES, mechanisms=None, constants=None, observation_groups=None, record_years=False,
     ):  # fmt: skip
         _check_choice("mode", mode, MODES)
         _check_choice("thaw_formulation", thaw_formulation, THAW_FORMULATIONS)
@@ -318,6 +396,14 @@ class _Episodes:
         self.initial_ranges = check_initial_ranges(initial_ranges)
         self.harvest_min_class = harvest_min_class
         self.reward = Reward.of(reward)
+        objectives = check_objectives(objectives)
+        self.objective_names = objective_names(objectives)
+        self.own_objectives = [objective for objective in objectives if isinstance(objective, Objective)]
+        self.history_names = HISTORY_NAMES + tuple(
+            f"{objective.name}_{what}" for objective in self.own_objectives for what in ("clipped", "reward")
+        )
+        limits = [(o.low, o.high) if isinstance(o, Objective) else (-1.0, 1.0) for o in objectives]
+        self.reward_space = Box(*np.array(limits, dtype=np.float32).T, dtype=np.float32)
         self.record_years = bool(record_years)
         self.stands = sim.Stands(
             number, time_step_minutes=time_step_minutes, backend=backend, constants=constants, mechanisms=mechanisms,
@@ -333,12 +419,13 @@ class _Episodes:
         self.entries = [i for i, entry in enumerate(OBSERVATION) if entry.group in groups]
         if not self.entries:
             raise ValueError(f"observation_groups = {observation_groups!r}: nothing is left to observe in mode {mode}")
+        self.observation_space = observation_space(self.entries, self.reward.largest_penalties())
         self.preference = np.zeros(number)
         self.site_seeds = np.zeros(number, dtype=np.int64)
         self.episode_seeds = np.zeros(number, dtype=np.int64)
         self.year = np.zeros(number, dtype=int)
         self.running = np.zeros(number, dtype=bool)
-        self.history = np.zeros((number, self.years, len(HISTORY_NAMES)))
+        self.history = np.zeros((number, self.years, len(self.history_names)))
         self._observation = np.zeros((number, len(OBSERVATION)))
 
     def draw(self, generator: np.random.Generator) -> tuple[int, int, float]:
@@ -372,7 +459,7 @@ class _Episodes:
         self._observe_start(np.asarray(indices), chosen)
 
     def advance(self, actions) -> np.ndarray:
-        """A year for all episodes; returns float32 rewards (number, 2)."""
+        """A year for all episodes; returns float32 rewards (number, objectives)."""
         if not self.running.all():
             stopped = int(np.argmin(self.running))
             raise RuntimeError(f"step on episode {stopped} that is not running: call reset first")
@@ -380,17 +467,30 @@ class _Episodes:
         before = self.conifer_fraction()
         record = self.stands.step(actions)
         parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
-        year = self.year
-        self.history[np.arange(self.number), year] = np.column_stack([record, *(parts[n] for n in REWARD_COLUMNS)])
-        self.year = year + 1
+        columns = dict(zip(sim.RECORD_NAMES, record.T, strict=True)) | parts
+        for objective in self.own_objectives:
+            columns |= objective.columns(columns)
+        self.history[np.arange(self.number), self.year] = np.column_stack([columns[n] for n in self.history_names])
+        self.year = self.year + 1
         self.running = self.year < self.years
         self._observe_year(record, actions, before, parts)
-        return np.stack([parts["carbon_reward"], parts["thaw_reward"]], axis=1).astype(np.float32)
+        return np.stack([columns[f"{name}_reward"] for name in self.objective_names], axis=1).astype(np.float32)
 
     def observations(self) -> np.ndarray:
         """Fresh float32 observations, shape (number, entries)."""
         self._observation[:, 0] = self.preference
         return self._observation[:, self.entries].astype(np.float32)
+
+    def action_masks(self) -> np.ndarray:
+        """Actions that can be carried out in full, bool, shape (number, 25)."""
+        self.check_begun("action_masks")
+        return action_masks(self._observation.astype(np.float32), self.harvest_min_class)
+
+    def check_begun(self, what: str) -> None:
+        """Refuse what needs a stand before the first reset."""
+        fresh = ~self.running & (self.year == 0)
+        if fresh.any():
+            raise RuntimeError(f"{what} of episode {int(np.argmax(fresh))} that has not begun: call reset first")
 
     def conifer_fraction(self) -> np.ndarray:
         """Conifers among the stems now, shape (number,)."""
@@ -398,28 +498,28 @@ class _Episodes:
 
     def final_info(self, i: int) -> dict:
         """Totals of a finished episode."""
-        years = self.history[i, : self.year[i]]
+        years = dict(zip(self.history_names, self.history[i, : self.year[i]].T, strict=True))
 
         def mean(name):
-            return float(years[:, _HISTORY[name]].mean())
+            return float(years[name].mean())
 
+        names = (*PAPER_OBJECTIVES, *(objective.name for objective in self.own_objectives))
         info = {
-            "carbon_return": float(years[:, _HISTORY["carbon_reward"]].sum()),
-            "thaw_return": float(years[:, _HISTORY["thaw_reward"]].sum()),
+            **{f"{name}_return": float(years[f"{name}_reward"].sum()) for name in names},
             "site_seed": int(self.site_seeds[i]),
             "episode_seed": int(self.episode_seeds[i]),
             "preference": float(self.preference[i]),
-            "final_density": float(years[-1, _HISTORY["density_stems_ha"]]),
+            "final_density": float(years["density_stems_ha"][-1]),
             "mean_density": mean("density_stems_ha"),
-            "final_conifer_fraction": float(years[-1, _HISTORY["conifer_fraction"]]),
+            "final_conifer_fraction": float(years["conifer_fraction"][-1]),
             "mean_conifer_fraction": mean("conifer_fraction"),
             "growing_season_days": mean("growing_season_days"),
             "latent_heat_mj_m2": mean("latent_heat_mj_m2"),
             "ground_shortwave_mj_m2": mean("ground_shortwave_mj_m2"),
         }
         if self.record_years:
-            record = {name: years[:, k].copy() for name, k in _HISTORY.items()}
-            info["years"] = {"year": np.arange(1, len(years) + 1), **record}
+            record = {name: column.copy() for name, column in years.items()}
+            info["years"] = {"year": np.arange(1, self.year[i] + 1), **record}
         return info
 
     def _observe_start(self, indices, sites) -> None:
@@ -488,10 +588,10 @@ class _Episodes:
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
-        there, here = ((kind, *history.shape[:2]) for kind, history in
+        there, here = ((kind, *history.shape) for kind, history in
                        ((state["mode"], state["history"]), (self.mode, self.history)))  # fmt: skip
         if there != here:
-            raise ValueError(f"state of (mode, episodes, years) {there} given to {here}")
+            raise ValueError(f"state of (mode, episodes, years, columns of the record) {there} given to {here}")
         self.stands.set_state(state["stands"])
         for name, value in state.items():
             if name not in ("mode", "stands"):
@@ -515,6 +615,13 @@ def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict
         if name not in allowed:
             raise ValueError(f"unknown reset option {name!r}; allowed: {', '.join(allowed)}")
     return dict(options or {})
+
+
+def check_saved(state: dict, keys: Sequence[str]) -> None:
+    """A dict that `get_state` of the same kind of environment gave."""
+    if not isinstance(state, dict) or set(state) != set(keys):
+        got = sorted(state) if isinstance(state, dict) else type(state).__name__
+        raise ValueError(f"state: a dict of {', '.join(keys)} from get_state is allowed, got {got}")
 
 
 ARGUMENTS = tuple(name for name in inspect.signature(_Episodes).parameters if name != "number")
@@ -566,7 +673,8 @@ class BorealEnv(gym.Env, EzPickle):
 
     ## Reward Space
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, soil and wood products over `carbon_scale`,
-    less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2.
+    less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2. Another
+    objective is a function of the year's record: `objectives=("carbon", "thaw", Objective("timber", value, 0, 1))`.
 
     ## Starting State
     Site, first stocks and ages, weather and preference are drawn anew in generalist mode, and are fixed in
@@ -588,6 +696,7 @@ class BorealEnv(gym.Env, EzPickle):
     - `hwp_half_life_years`: half-life of wood products (None: for ever)
     - `harvest_min_class`: youngest class that may be cut: "young", "mature" or "old"
     - `reward`: a `Reward` or a dict of its constants
+    - `objectives`: of the reward vector, "carbon", "thaw" and any `Objective` of your own
     - `mechanisms`: switches of the physics, see `sim.MECHANISMS`
     - `constants`: literature constants to override, see `sim/constants.csv`
     - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`
@@ -609,10 +718,10 @@ class BorealEnv(gym.Env, EzPickle):
             _check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self._episodes = _Episodes(1, **_known(kwargs))
-        self.observation_space = observation_space(self._episodes.entries)
+        self.observation_space = self._episodes.observation_space
         self.action_space = Discrete(NUM_ACTIONS)
-        self.reward_space = Box(-1.0, 1.0, (2,), np.float32)
-        self.reward_dim = 2
+        self.reward_space = self._episodes.reward_space
+        self.reward_dim = len(self._episodes.objective_names)
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Start an episode. options: "preference" (weight of carbon) and "site" (parameter -> value)."""
@@ -636,13 +745,13 @@ class BorealEnv(gym.Env, EzPickle):
 
     def action_masks(self) -> np.ndarray:
         """Actions that can be carried out in full, bool, shape (25,)."""
-        observation = (self._episodes._observation).astype(np.float32)
-        return action_masks(observation, self._episodes.harvest_min_class)[0]
+        return self._episodes.action_masks()[0]
 
     def render(self):
         """A picture of the stand, uint8 (height, width, 3), with `render_mode="rgb_array"`; otherwise None."""
         if self.render_mode is None:
             return None
+        self._episodes.check_begun("picture")
         from analysis.drawing import draw_stand
 
         return draw_stand(self._episodes, 0)
@@ -653,6 +762,7 @@ class BorealEnv(gym.Env, EzPickle):
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
+        check_saved(state, ("episodes", "generator"))
         self._episodes.set_state(state["episodes"])
         self.np_random.bit_generator.state = state["generator"]
 
@@ -662,18 +772,20 @@ class BorealEnv(gym.Env, EzPickle):
 # ---------------------------------------------------------------------------------------------------------------
 
 
-class BorealVectorEnv(VectorEnv):
+class BorealVectorEnv(VectorEnv, EzPickle):
     """`num_envs` environments in lockstep, without worker processes; arguments as for `BorealEnv`.
 
     With the same seeds and actions it gives the trajectories of `num_envs` single environments. Episodes that end
     start anew within the step (`AutoresetMode.SAME_STEP`); infos then have `final_obs` and `final_info`.
     `group_size` neighbours share site, start, weather and disturbance dice in every episode, not the preference.
-    `reset(options={"preference": one or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`.
+    `reset(options={"preference": one or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`, where
+    only stands of the mask start anew.
     """
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
 
     def __init__(self, num_envs: int = 1, *, group_size: int = 1, render_mode: str | None = None, **kwargs):
+        EzPickle.__init__(self, num_envs, group_size=group_size, render_mode=render_mode, **kwargs)
         if render_mode is not None:
             raise ValueError(f"render_mode {render_mode!r}: the vector environment draws nothing; None is allowed")
         if isinstance(num_envs, bool) or not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
@@ -684,12 +796,12 @@ class BorealVectorEnv(VectorEnv):
             raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
         self.num_envs, self.group_size = int(num_envs), int(group_size)
         self._episodes = _Episodes(self.num_envs, **_known(kwargs))
-        self.single_observation_space = observation_space(self._episodes.entries)
+        self.single_observation_space = self._episodes.observation_space
         self.single_action_space = Discrete(NUM_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.reward_space = Box(-1.0, 1.0, (2,), np.float32)
-        self.reward_dim = 2
+        self.reward_space = self._episodes.reward_space
+        self.reward_dim = len(self._episodes.objective_names)
         self._generators: list[np.random.Generator] | None = None
 
     def reset(self, *, seed=None, options: dict | None = None):
@@ -704,8 +816,8 @@ class BorealVectorEnv(VectorEnv):
         sites = _spread("site", options.get("site"), self.num_envs)
         for site in sites:
             sim.middle_site(site)
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else seed
-        seeds = _spread("seed", seeds, self.num_envs)
+        one = isinstance(seed, (int, np.integer)) and not isinstance(seed, bool)
+        seeds = _spread("seed", [seed + i for i in range(self.num_envs)] if one else seed, self.num_envs)
         if self._generators is None:
             self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
         for i, value in enumerate(seeds):
@@ -723,7 +835,7 @@ class BorealVectorEnv(VectorEnv):
         if ended.any():
             indices = np.flatnonzero(ended)
             for i in indices:
-                final = {"final_obs": observations[i].copy(), "final_info": self._episodes.final_info(i)}
+                final = {"final_info": self._episodes.final_info(i), "final_obs": observations[i].copy()}
                 infos = self._add_info(infos, final, i)
             nothing = [None] * self.num_envs
             self._begin(indices, nothing, nothing)
@@ -732,7 +844,7 @@ class BorealVectorEnv(VectorEnv):
 
     def action_masks(self) -> np.ndarray:
         """Actions that can be carried out in full, bool, shape (num_envs, 25)."""
-        return action_masks(self._episodes._observation.astype(np.float32), self._episodes.harvest_min_class)
+        return self._episodes.action_masks()
 
     def call(self, name: str, *args, **kwargs) -> tuple:
         """A method of every environment, as with gymnasium's AsyncVectorEnv: here `action_masks` only."""
@@ -746,6 +858,7 @@ class BorealVectorEnv(VectorEnv):
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
+        check_saved(state, ("episodes", "generators"))
         self._episodes.set_state(state["episodes"])
         self._generators = state["generators"] and [np.random.default_rng(0) for _ in range(self.num_envs)]
         for generator, value in zip(self._generators or [], state["generators"] or [], strict=True):

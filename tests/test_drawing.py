@@ -1,12 +1,17 @@
 import itertools
+import json
 
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from gymnasium.wrappers import RenderCollection
+from PIL import Image
 
 import boreal_env
+from analysis import draw_readme
 from analysis.drawing import HEIGHT, WIDTH
+from cleanrl_style import ppo_curriculum
 
 NO_FIRE = {"fire": False, "insects": False}
 
@@ -98,3 +103,30 @@ def test_frames_of_a_video():
     assert len(frames) == 4
     assert all(frame.shape == (HEIGHT, WIDTH, 3) and frame.dtype == np.uint8 for frame in frames)
     assert all((one != other).any() for one, other in itertools.pairwise(frames))
+
+
+def test_an_animation_has_all_frames_and_colours(tmp_path):
+    pictures = [Image.new("RGB", draw_readme.FRAME_SIZE, colour) for colour in ("red", "blue", "red", "blue")]
+    draw_readme.save_animation(tmp_path / "four.gif", pictures)
+    with Image.open(tmp_path / "four.gif") as animation:
+        assert animation.n_frames == 4 and animation.size == draw_readme.FRAME_SIZE
+        for k, primary in enumerate((0, 2, 0, 2)):
+            animation.seek(k)
+            assert animation.convert("RGB").getpixel((0, 0))[primary] > 200
+
+
+def test_the_policy_of_a_run_is_played(tmp_path):
+    agent = ppo_curriculum.Agent(gym.make_vec("boreal-site-specific-v0", num_envs=1))
+    torch.save({"agent": agent.state_dict()}, tmp_path / "checkpoint.pt")
+    config = {"script": "ppo_curriculum", "arguments": {"env_id": "boreal-site-specific-v0"}}
+    (tmp_path / "config.json").write_text(json.dumps(config))
+    policy, env_id = draw_readme.trained_policy(tmp_path)
+    assert env_id == "boreal-site-specific-v0"
+    masks = np.zeros((2, 25), bool)
+    masks[0, 3] = masks[1, 24] = True
+    assert policy(np.zeros((2, 43), np.float32), masks, np.zeros((2, 2), np.float32)).tolist() == [3, 24]
+
+
+def test_a_run_without_a_checkpoint_is_refused(tmp_path):
+    with pytest.raises(SystemExit, match="no checkpoint"):
+        draw_readme.trained_policy(tmp_path)

@@ -1,7 +1,11 @@
 """The environment as its users meet it: registration, spaces, seeds, vectorisation, masks, rewards, refusals."""
 
+import csv
+import gc
 import pickle
+import tracemalloc
 import warnings
+from functools import partial
 
 import gymnasium as gym
 import mo_gymnasium
@@ -10,11 +14,15 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode
 from gymnasium.wrappers import TransformReward
+from hypothesis import given
+from hypothesis import strategies as st
 from mo_gymnasium.wrappers import LinearReward
+from scripts import ROOT
 
 import boreal_env
 import sim
-from boreal_env import OBSERVATION, OBSERVATION_NAMES, BorealEnv, BorealVectorEnv, Reward
+from analysis import document_environment
+from boreal_env import OBSERVATION, OBSERVATION_NAMES, BorealEnv, BorealVectorEnv, Objective, Reward
 
 IDS = ("boreal-generalist-v0", "boreal-site-specific-v0", "boreal-balanced-v0")
 QUICK = {"years": 4, "time_step_minutes": 240}
@@ -43,9 +51,9 @@ def play(env, actions, **reset):
 
 
 def assert_same(a, b):
-    """Equal in structure and to the bit, NaN beside NaN."""
+    """Equal in structure, types and to the bit, NaN beside NaN."""
     if isinstance(a, dict):
-        assert a.keys() == b.keys()
+        assert list(a) == list(b)
         for key in a:
             assert_same(a[key], b[key])
     elif isinstance(a, np.ndarray) and a.dtype == object:
@@ -53,6 +61,7 @@ def assert_same(a, b):
         for one, other in zip(a.flat, b.flat, strict=True):
             assert_same(one, other)
     else:
+        assert np.asarray(a).dtype == np.asarray(b).dtype
         np.testing.assert_array_equal(a, b)
 
 
@@ -101,6 +110,38 @@ def test_gymnasiums_checker_is_satisfied(mode):
         check_env(env, skip_render_check=True)
 
 
+def test_the_passive_checker_has_nothing_to_say_but_that_rewards_are_vectors():
+    env = gym.make("boreal-generalist-v0", disable_env_checker=False, render_mode="rgb_array", **QUICK)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        env.reset(seed=1)
+        for action in (0, 12, 24, 4):
+            env.step(action)
+        env.render()
+    remarks = [str(w.message) for w in caught if not issubclass(w.category, DeprecationWarning)]  # of old matplotlibs
+    assert len(remarks) == 1 and "reward returned by `step()` must be a float" in remarks[0]
+
+
+def test_a_spawned_worker_needs_nothing_but_the_id():
+    make = partial(gym.make, "boreal_env:boreal-generalist-v0", **QUICK)
+    envs = AsyncVectorEnv([make], autoreset_mode=AutoresetMode.SAME_STEP, context="spawn")
+    try:
+        observations, _ = envs.reset(seed=3)
+        stepped, rewards, *_ = envs.step(np.array([24]))
+    finally:
+        envs.close()
+    expected = play(quick(), [24], seed=3)
+    np.testing.assert_array_equal([observations[0], stepped[0]], expected[0])
+    np.testing.assert_array_equal(rewards, expected[1])
+
+
+def test_instances_do_not_disturb_each_other():
+    one, other = quick(), quick(mode="site_specific")
+    one.reset(seed=1), other.reset(seed=9)
+    rewards = [(one.step(action)[1], other.step(24 - action)[1])[0] for action in (24, 0, 17, 3)]
+    np.testing.assert_array_equal(rewards, play(quick(), [24, 0, 17, 3], seed=1)[1])
+
+
 def test_mo_gymnasiums_linear_reward():
     env = LinearReward(mo_gymnasium.make("boreal-generalist-v0", **QUICK), weight=np.array([0.25, 0.75]))
     env.reset(seed=1)
@@ -116,6 +157,35 @@ def test_pickle_keeps_the_arguments():
     for one, other in zip(play(env, [24, 0, 12, 7], seed=5), play(copy, [24, 0, 12, 7], seed=5), strict=True):
         assert_same(one, other)
     assert copy._episodes.thaw_formulation == "contrast" and copy._episodes.reward.carbon_scale == 0.4
+
+
+def test_pickle_of_the_vector_environment_keeps_the_arguments():
+    envs = quick_vector(4, group_size=2, reward={"carbon_scale": 0.4})
+    actions = np.array([[24, 0, 12, 7], [3, 17, 24, 12]])
+    expected = vector_trace(envs, actions, 5)  # threads are running now
+    copy = pickle.loads(pickle.dumps(envs))
+    assert (copy.num_envs, copy.group_size) == (4, 2)
+    for one, other in zip(vector_trace(copy, actions, 5), expected, strict=True):
+        for a, b in zip(one, other, strict=True):
+            assert_same(a, b)
+
+
+def test_memory_is_bounded_over_any_number_of_episodes():
+    env = quick(years=20, time_step_minutes=1440, record_years=True)
+
+    def memory_after(seeds):
+        for seed in seeds:
+            play(env, [24, 0] * 10, seed=seed)
+        gc.collect()
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        before = memory_after(range(4))
+        growth = memory_after(range(4, 12)) - before
+    finally:
+        tracemalloc.stop()
+    assert growth < 4 * env._episodes.history.nbytes  # of eight episodes' records
 
 
 # -------------------------------------------------------------------------------------------------- the spaces
@@ -145,6 +215,15 @@ def test_physical_limits_of_the_site_lie_in_the_observation_space(corner):
     assert observation in env.observation_space
     expected = [(getattr(p, corner) - p.low) / (p.high - p.low) for p in sim.SITE_PARAMETERS.values()]
     np.testing.assert_allclose(observation[SITE], expected, rtol=1e-5)
+
+
+def test_penalties_of_heavy_constants_lie_in_the_observation_space():
+    reward = {"biomass_limit": 0.001, "soil_limit": 0.001, "density_penalty": 500.0}
+    env = quick(reward=reward, initial_ranges={"density_stems_ha": (2100.0, 2200.0)})
+    env.reset(seed=1)
+    observation = env.step(24)[0]
+    assert observation in env.observation_space
+    assert (observation[40:43] > quick().observation_space.high[40:43]).tolist() == [True, True, True]
 
 
 def test_arrays_are_fresh_every_step():
@@ -264,9 +343,31 @@ def test_entries_of_the_climate_and_the_site(episode):
         site["seasonal_amplitude_c"] / 30.0, site["growth_start_day"] / 365.0, site["fall_start_day"] / 365.0,
         (site["fall_start_day"] - site["growth_start_day"]) / 200.0,
     ]  # fmt: skip
+    with (ROOT / "sim" / "site_parameters.csv").open() as file:
+        ranges = {row["name"]: (float(row["low"]), float(row["high"])) for row in csv.DictReader(file)}
+    scaled = [(site[name] - low) / (high - low) for name, (low, high) in ranges.items()]
+    assert len(scaled) == 62
     for observation in observations:
         np.testing.assert_allclose(observation[5:11], climate, rtol=1e-5)
-        np.testing.assert_allclose(observation[SITE], sim.scale_site(site), rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(observation[43:105], scaled, rtol=1e-5, atol=1e-6)
+
+
+def test_every_index_is_compared_with_a_formula():
+    elsewhere = {"density_action", "mix_action", "mix_change", *OBSERVATION_NAMES[5:11], *OBSERVATION_NAMES[43:]}
+    assert FORMULAS.keys() | elsewhere == set(OBSERVATION_NAMES)
+
+
+def test_the_page_of_the_environment_is_what_the_code_makes():
+    """After a change: python analysis/document_environment.py."""
+    assert (ROOT / "docs" / "environment.md").read_text(encoding="utf-8") == document_environment.page()
+
+
+def test_normalisations_are_written_as_they_are():
+    for name, x, written in (("year", 25.0, "x / 50"), ("latitude", 60.0, "(x - 50) / 20"), ("mix_change", -0.5, "x"),
+                             ("biomass_change", 0.1, "x + 0.5"), ("soil_change", 0.1, "(x + 0.2) / 0.4")):  # fmt: skip
+        entry = OBSERVATION[INDEX[name]]
+        assert document_environment.normalisation(entry) == written
+        assert eval(written) == pytest.approx((x + entry.shift) / entry.scale)
 
 
 def test_age_fractions_of_both_species_sum_to_one(episode):
@@ -391,6 +492,22 @@ def test_first_stocks_are_drawn_from_their_ranges():
     assert biomass.max() <= 10.0 and (biomass <= 1e-4 * 120.0 * density + 1e-4).all()
     narrow = quick_vector(16, initial_ranges={"density_stems_ha": (700.0, 710.0)}).reset(seed=1)[0]
     assert (np.abs(1500.0 * narrow[:, INDEX["density"]] - 705.0) <= 5.001).all()
+
+
+def test_an_overridden_range_is_drawn_from():
+    drawn, _ = quick_vector(32, parameter_overrides={"q10": (1.9, 2.0)}).reset(seed=1)
+    q10 = 1.8 + 0.5 * drawn[:, INDEX["site_q10"]]
+    assert 1.9 <= q10.min() < 1.92 and 1.98 < q10.max() <= 2.0
+    whole, _ = quick_vector(32).reset(seed=1)
+    np.testing.assert_array_equal(np.delete(drawn, INDEX["site_q10"], 1), np.delete(whole, INDEX["site_q10"], 1))
+
+
+def test_the_interpreted_backend_gives_the_same_episode():
+    compiled, interpreted = (
+        play(quick(years=1, time_step_minutes=720, backend=backend), [24], seed=1) for backend in ("numba", "python")
+    )
+    for one, other in zip(compiled[:2], interpreted[:2], strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-7)
 
 
 # ------------------------------------------------------------------------------------------- site-specific mode
@@ -660,6 +777,13 @@ def test_the_penalty_is_half_the_share_that_could_not_be_made():
     assert info["years"]["density_penalty"][0] == 1.0  # 2000 stems after planting
 
 
+def test_masks_of_nan_are_refused():
+    observations = np.zeros((2, 43))
+    observations[1, INDEX["density"]] = NAN
+    with pytest.raises(ValueError, match="observations: finite densities"):
+        boreal_env.action_masks(observations)
+
+
 @pytest.mark.parametrize("observations", [np.zeros((2, 10)), np.zeros((2, 2, 105)), np.zeros(0)], ids=str)
 def test_masks_of_arrays_that_are_no_observations_are_refused(observations):
     with pytest.raises(ValueError, match=r"observations.*\(n, "):
@@ -683,6 +807,40 @@ def test_components_add_up_to_the_carbon_reward(episode):
     assert info["carbon_return"] == pytest.approx(y["carbon_reward"].sum())
     assert info["thaw_return"] == pytest.approx(y["thaw_reward"].sum())
     assert y["biomass_limit_penalty"].max() > 0.0 and y["soil_limit_penalty"].max() > 0.0
+
+
+AMOUNTS = st.floats(0.0, 200.0)
+
+
+@given(
+    change=st.floats(-100.0, 100.0), biomass=AMOUNTS, soil=AMOUNTS, stored=AMOUNTS, density=st.floats(0.0, 4000.0),
+    planted=st.floats(0.0, 100.0), action=st.integers(0, 24), stock_bonus=st.floats(0.0, 2.0),
+    product_bonus=st.floats(0.0, 2.0), scale=st.floats(0.1, 10.0),
+)  # fmt: skip
+def test_what_is_rewarded_and_what_is_clipped_add_up(
+    change, biomass, soil, stored, density, planted, action, stock_bonus, product_bonus, scale
+):
+    columns = {"net_carbon_change_kgc_m2": change, "biomass_kgc_m2": biomass, "soil_kgc_m2": soil,
+               "hwp_stored_kgc_m2": stored, "density_after_action": density, "planted_stems_ha": planted,
+               "boundary_warming_mj_m2": biomass, "boundary_cooling_mj_m2": soil}  # fmt: skip
+    record = np.zeros((1, len(sim.RECORD_NAMES)))
+    for name, value in columns.items():
+        record[0, sim.RECORD_NAMES.index(name)] = value
+    reward = Reward(carbon_scale=scale, stock_bonus=stock_bonus, product_bonus=product_bonus)
+    parts = boreal_env.rewards_of_year(record, np.array([action]), reward, "asymmetric")
+    p = {name: float(value[0]) for name, value in parts.items()}
+    assert tuple(p) == boreal_env.REWARD_COLUMNS
+    gains = p["carbon_change"] + p["stock_bonus"] + p["product_bonus"]
+    names = ("biomass_limit_penalty", "soil_limit_penalty", "density_penalty", "ineffective_penalty")
+    penalties = sum(p[name] for name in names)
+    assert p["carbon_reward"] + p["carbon_clipped"] == pytest.approx(gains - penalties, abs=1e-9)
+    unclipped = change / scale + stock_bonus * (biomass + soil) / 50.0 + product_bonus * stored
+    assert gains + p["components_clipped"] == pytest.approx(unclipped, abs=1e-9)
+    assert p["thaw_reward"] + p["thaw_clipped"] == pytest.approx((soil - 2.5 * biomass) / 40.0, abs=1e-9)
+    assert abs(p["carbon_reward"]) <= 1.0 and abs(p["thaw_reward"]) <= 1.0
+    assert min(p[name] for name in names) >= 0.0
+    if abs(gains - penalties) <= 1.0:
+        assert p["carbon_clipped"] == 0.0
 
 
 def test_carbon_reward_by_the_papers_formula(episode):
@@ -781,6 +939,84 @@ def test_the_physics_can_be_changed_through_the_environment():
         ranges = {"density_stems_ha": (590.0, 600.0)}
         base = play(quick(initial_ranges=ranges), ACTIONS, seed=1)[1]
         assert not np.array_equal(play(quick(initial_ranges=ranges, **change), ACTIONS, seed=1)[1], base), change
+
+
+# --------------------------------------------------------------------------------------- objectives of one's own
+
+PRICE = 200.0  # of a kgC/m2 of timber
+
+
+def timber_revenue(year):
+    """What the timber of a year is sold for, less what planting costs."""
+    return PRICE * year["harvest_kgc_m2"] - 0.1 * year["planted_stems_ha"]
+
+
+TIMBER = Objective("timber", timber_revenue, low=-10.0, high=100.0)
+THREE = ("carbon", "thaw", TIMBER)
+OLD_STAND = {"density_stems_ha": (900.0, 900.0), "biomass_kgc_m2": (8.0, 9.0), "oldest_age_years": (120.0, 120.0)}
+
+
+def test_a_third_objective():
+    kwargs = {"record_years": True, "initial_ranges": OLD_STAND}
+    env = quick(objectives=THREE, **kwargs)
+    assert env.reward_dim == 3
+    assert env.reward_space == gym.spaces.Box(np.float32([-1, -1, -10]), np.float32([1, 1, 100]))
+    actions = [0, 24, 12, 4]
+    observations, rewards, info = play(env, actions, seed=1)
+    paper_observations, paper_rewards, paper_info = play(quick(**kwargs), actions, seed=1)
+    np.testing.assert_array_equal(observations, paper_observations)
+    np.testing.assert_array_equal(rewards[:, :2], paper_rewards)
+    y = info["years"]
+    revenue = 200.0 * y["harvest_kgc_m2"] - 0.1 * y["planted_stems_ha"]
+    assert revenue[0] > 100.0 and revenue[1] == -10.0 and revenue[2] == 0.0
+    np.testing.assert_allclose(rewards[:, 2], np.clip(revenue, -10.0, 100.0), rtol=1e-6)
+    np.testing.assert_allclose(y["timber_reward"] + y["timber_clipped"], revenue)
+    assert y["timber_clipped"][0] > 0.0
+    assert info["timber_return"] == pytest.approx(rewards[:, 2].sum())
+    assert info.keys() - paper_info.keys() == {"timber_return"}
+    assert y.keys() - paper_info["years"].keys() == {"timber_reward", "timber_clipped"}
+    assert pickle.loads(pickle.dumps(env)).reward_dim == 3
+
+
+def test_a_third_objective_in_vector_environments():
+    kwargs = {"objectives": (TIMBER, "carbon"), "initial_ranges": OLD_STAND, **QUICK}
+    actions = np.random.default_rng(1).integers(0, 25, (5, 2))
+    lockstep = gym.make_vec("boreal-generalist-v0", num_envs=2, **kwargs)
+    assert lockstep.reward_dim == 2 and lockstep.reward_space.high.tolist() == [100.0, 1.0]
+    parallel = AsyncVectorEnv([lambda: BorealEnv(**kwargs)] * 2, autoreset_mode=AutoresetMode.SAME_STEP)
+    try:
+        workers = vector_trace(parallel, actions, 3)
+    finally:
+        parallel.close()
+    for one, other in zip(vector_trace(lockstep, actions, 3)[1:], workers[1:], strict=True):
+        np.testing.assert_array_equal(one[1], other[1])
+        assert_same(one[4], other[4])
+    resumed = BorealVectorEnv(2, **kwargs)
+    resumed.set_state(pickle.loads(pickle.dumps(lockstep.get_state())))
+    np.testing.assert_array_equal(resumed.step(actions[0])[1], lockstep.step(actions[0])[1])
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: quick(objectives=("carbon", "timber")), r"objective 'timber': allowed are carbon, thaw"),
+        (lambda: quick(objectives=()), r"objectives: .* got \(\)"),
+        (lambda: quick(objectives="carbon"), r"objectives: .* got 'carbon'"),
+        (lambda: quick(objectives=None), r"objectives: .* got None"),
+        (lambda: quick(objectives=("carbon", timber_revenue)), r"objective <function .*: allowed are carbon, thaw"),
+        (lambda: quick(objectives=("thaw", "thaw")), r"objectives thaw, thaw: each is allowed once"),
+        (lambda: Objective("carbon", timber_revenue), r"objective name 'carbon': an identifier is allowed"),
+        (lambda: Objective("my timber", timber_revenue), r"objective name 'my timber': an identifier"),
+        (lambda: Objective("timber", 5.0), r"objective timber: a function .* got 5.0"),
+        (lambda: Objective("timber", timber_revenue, 1.0, 0.0), r"objective timber: .* low < high .* \(1.0, 0.0\)"),
+        (lambda: Objective("timber", timber_revenue, 0.0, np.inf), r"objective timber: finite limits .* inf"),
+        (lambda: play(quick(objectives=(Objective("bad", lambda year: 1.0),)), [12]), r"objective bad: 1 finite"),
+        (lambda: play(quick(objectives=(Objective("bad", lambda year: [NAN]),)), [12]), r"objective bad: .*nan"),
+    ],
+)  # fmt: skip
+def test_bad_objectives_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
 
 
 # ----------------------------------------------------------------------------------------------------- refusals
@@ -892,6 +1128,38 @@ def test_step_before_reset_is_refused(make):
         make().step([12] if isinstance(make(), BorealVectorEnv) else 12)
 
 
+@pytest.mark.parametrize("make", [quick, lambda **kwargs: quick_vector(2, **kwargs)], ids=["single", "vector"])
+def test_masks_before_reset_are_refused(make):
+    with pytest.raises(RuntimeError, match="action_masks of episode 0 that has not begun: call reset first"):
+        make().action_masks()
+
+
+def test_a_picture_before_reset_is_refused():
+    with pytest.raises(RuntimeError, match="picture of episode 0 that has not begun: call reset first"):
+        quick(render_mode="rgb_array").render()
+
+
+def test_masks_stay_after_the_end():
+    env = quick(years=2)
+    observations, *_ = play(env, [24, 24], seed=1)
+    np.testing.assert_array_equal(env.action_masks(), boreal_env.action_masks(observations[-1])[0])
+
+
+@pytest.mark.parametrize(("state", "got"), [({}, r"\[\]"), (None, "NoneType"), ({"generator": 1}, r"\['generator'\]")])
+def test_what_is_no_state_is_refused(state, got):
+    for env in (quick(), quick_vector(2)):
+        with pytest.raises(ValueError, match=rf"state: a dict of episodes, generators?.* got {got}"):
+            env.set_state(state)
+
+
+def test_the_state_of_a_vector_environment_is_not_that_of_one():
+    one, envs = quick(), quick_vector(1)
+    one.reset(seed=1), envs.reset(seed=1)
+    for env, state in ((one, envs.get_state()), (envs, one.get_state())):
+        with pytest.raises(ValueError, match="state: a dict of episodes"):
+            env.set_state(state)
+
+
 def test_step_after_the_end_is_refused():
     env = quick()
     play(env, [12] * 4, seed=1)
@@ -920,7 +1188,7 @@ def test_reset_refuses(options, message):
             env.reset(seed=1, options=options)
 
 
-@pytest.mark.parametrize("seed", [-1, 1.5, "one", [1, 2.5], [1, -2]])
+@pytest.mark.parametrize("seed", [-1, 1.5, "one", True, [1, 2.5], [1, -2]])
 def test_bad_seeds_are_refused(seed):
     with pytest.raises((ValueError, gym.error.Error), match="(?i)seed"):
         quick_vector(2).reset(seed=seed)
