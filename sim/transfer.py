@@ -109,7 +109,8 @@ def move_energy_and_water(b, seconds):
         r.deep_heat_gain_mj_m2[i] += 1e-6 * seconds * (surface_to_deep - deep_to_boundary)
         w.soil_heat_sum[i] += 1e-6 * seconds * ground_to_surface
         w.thaw_warmth[i] += seconds * max(s.ground[i], 0.0)
-        w.thaw_seconds[i] += seconds if s.ground[i] > 0.0 else 0.0
+        # A melting snowpack is at 0 degC but for round-off.
+        w.thaw_seconds[i] += seconds if s.ground[i] > 1e-6 else 0.0
         w.air_sum[i] += w.air[i]
         w.canopy_sum[i] += canopy
         w.ground_sum[i] += s.ground[i]
