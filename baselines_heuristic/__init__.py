@@ -45,15 +45,15 @@ def main(script: str, policy) -> None:
     env_kwargs = protocol.prepare(args)
     if args.env_id not in protocol.MODES:
         protocol.fail(f"--env-id must be one of {', '.join(protocol.MODES)}, not {args.env_id}")
-    run = protocol.Run(args, Path(script).stem)
 
     def action_probabilities(observations, masks, accrued_returns):
         return np.eye(25)[policy(observations)]
 
-    start = time.perf_counter()
-    episodes, years = protocol.evaluate(args, env_kwargs, action_probabilities, (0.0,), ("sampled",))
-    run.time("evaluation", 0, time.perf_counter() - start)
-    run.finish(repeat(episodes, args.eval_weights), repeat(years, args.eval_weights))
+    with protocol.Run(args, Path(script).stem) as run:
+        start = time.perf_counter()
+        episodes, years = protocol.evaluate(args, env_kwargs, action_probabilities, (0.0,), ("sampled",))
+        run.time("evaluation", 0, time.perf_counter() - start)
+        run.finish(repeat(episodes, args.eval_weights), repeat(years, args.eval_weights))
 
 
 def repeat(table: pd.DataFrame, weights) -> pd.DataFrame:

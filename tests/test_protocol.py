@@ -151,7 +151,6 @@ def test_rows_are_on_disk_at_once(tmp_path):
     run.log("episodes", {"step": np.int64(1), "value": 1 / 3})
     run.log("episodes", {"step": 2})
     assert (tmp_path / "run" / "episodes.csv").read_text() == "step,value\n1,0.333333333\n2,\n"
-    assert run.table_sizes() == {"episodes": 28}
     with pytest.raises(ValueError):
         run.log("episodes", {"steps": 3})
 
@@ -177,13 +176,27 @@ def test_other_arguments_are_refused_and_named(tmp_path):
     assert (tmp_path / "config.json").read_bytes() == before
 
 
-def test_unfinished_runs_are_refused_unless_overwritten(tmp_path):
-    make_run(tmp_path).log("episodes", {"step": 1, "value": 1.0})
-    with pytest.raises(SystemExit, match="unfinished.*--overwrite starts over"):
-        make_run(tmp_path)
-    make_run(tmp_path, overwrite=True, colour="blue")
+def test_a_run_without_a_checkpoint_starts_again_and_keeps_its_times(tmp_path):
+    run = make_run(tmp_path)
+    run.log("episodes", {"step": 1, "value": 1.0})
+    run.time("rollout", 1, 2.5)
+    with (tmp_path / "timing.csv").open("a") as file:
+        file.write("rollout,2,0")  # what a full disk may leave of a row
+    again = make_run(tmp_path)
+    assert again.checkpoint is None
     assert (tmp_path / "episodes.csv").read_text() == "step,value\n"
+    again.time("rollout", 1, 3.5)
+    timing = pd.read_csv(tmp_path / "timing.csv")
+    assert timing.seconds.tolist() == [2.5, 3.5] and timing.elapsed_seconds.is_monotonic_increasing
+
+
+def test_overwrite_starts_over(tmp_path):
+    make_run(tmp_path).time("rollout", 1, 2.5)
+    (tmp_path / "checkpoint.pt").write_bytes(b"of another run")
+    make_run(tmp_path, overwrite=True, colour="blue")
     assert json.loads((tmp_path / "config.json").read_text())["arguments"]["colour"] == "blue"
+    assert {path.name for path in tmp_path.iterdir()} == {"config.json", "episodes.csv", "timing.csv"}
+    assert len(pd.read_csv(tmp_path / "timing.csv")) == 0
 
 
 def test_foreign_folders_are_never_touched(tmp_path):
