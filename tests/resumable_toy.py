@@ -34,4 +34,4 @@ class ResumableToyEnv(ToyEnv):
                 setattr(self, name, value)
 
 
-gym.register("toy-v0", entry_point="resumable_toy:ResumableToyEnv")
+gym.register("resumable-toy-v0", entry_point="resumable_toy:ResumableToyEnv")
