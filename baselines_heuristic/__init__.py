@@ -13,7 +13,7 @@ from analysis import protocol
 
 @dataclass
 class Args:
-    """Evaluates a fixed strategy under the protocol of the trained agents and leaves a run folder."""
+    """Evaluates a strategy that does not learn under the protocol of the trained agents and leaves a run folder."""
 
     seed: int = 1
     """names the run's folder: the strategy has nothing random, and its episodes are always the same"""
@@ -36,10 +36,11 @@ class Args:
 
 
 def main(script: str, policy) -> None:
-    """Evaluate `policy`, a function of observations (n, d) giving actions (n,), as the script of that name.
+    """Evaluate `policy`, a function of observations (n, d) and masks (n, 25), as the script of that name.
 
-    A fixed strategy does not look at the preference and has no other policy when sampled. Its episodes are
-    therefore the same under every weight, and are simulated once.
+    It gives actions (n,), or probabilities of actions (n, 25), and does not look at the preference: its episodes
+    are the same under every weight, and are simulated once. None has another policy when greedy: random actions
+    stay random.
     """
     args = protocol.parse(Args)
     env_kwargs = protocol.prepare(args)
@@ -47,7 +48,8 @@ def main(script: str, policy) -> None:
         protocol.fail(f"--env-id must be one of {', '.join(protocol.MODES)}, not {args.env_id}")
 
     def action_probabilities(observations, masks, accrued_returns):
-        return np.eye(25)[policy(observations)]
+        chosen = policy(observations, masks)
+        return np.eye(25)[chosen] if chosen.ndim == 1 else chosen
 
     with protocol.Run(args, Path(script).stem) as run:
         start = time.perf_counter()

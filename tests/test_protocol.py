@@ -137,6 +137,19 @@ def test_a_greedy_policy_in_site_specific_mode_is_evaluated_once():
     assert episodes.policy.value_counts().to_dict() == {"sampled": 2, "greedy": 1}
 
 
+def test_other_thaw_formulations_are_also_judged_by_the_asymmetric_one():
+    def plus_100(observations, masks, accrued_returns):
+        return np.eye(25)[np.full(len(observations), 22)]
+
+    given = dict(env_id="boreal-generalist-v0", eval_episodes=1, eval_weights=(0.5,))
+    own, _ = evaluate(plus_100, **given)
+    other, _ = evaluate(plus_100, thaw_formulation="contrast", **given)
+    assert tuple(own.columns) == evaluation.EVALUATION_COLUMNS
+    assert tuple(other.columns) == (*evaluation.EVALUATION_COLUMNS, evaluation.ASYMMETRIC)
+    np.testing.assert_allclose(other.asymmetric_thaw_return, own.thaw_return, rtol=1e-6)
+    assert not np.allclose(other.thaw_return, own.thaw_return)
+
+
 # --------------------------------------------------------------------------------------------- run folder
 
 
