@@ -81,8 +81,8 @@ def assert_same_bytes(folder, other):
 
 
 @pytest.mark.parametrize("script, common", [
-    ("ppo_curriculum", TOY), ("ppo_gated", BOREAL), ("eupg_var_lambda", BOREAL), ("eupg_fixed_lambda", TOY),
-], ids=["ppo_curriculum-async", "ppo_gated-lockstep", "eupg_var_lambda-lockstep", "eupg_fixed_lambda-async"])
+    ("ppo_curriculum", TOY), ("ppo_gated", TOY), ("eupg_var_lambda", BOREAL), ("eupg_fixed_lambda", TOY),
+], ids=["ppo_curriculum-async", "ppo_gated-async", "eupg_var_lambda-lockstep", "eupg_fixed_lambda-async"])
 def test_killed_and_resumed_is_as_never_killed(script, common, tmp_path):
     given, killed = arguments(script, common), tmp_path / "killed"
     process = start(script, killed, *given)
@@ -180,7 +180,7 @@ def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, t
 def test_a_full_disk_leaves_the_old_checkpoint(interrupted, tmp_path):
     folder = copy(interrupted, tmp_path)
     old = (folder / "checkpoint.pt").read_bytes()
-    code, out, err = finish(start("ppo_gated", folder, *arguments("ppo_gated", TOY), file_size=len(old) - 1))
+    code, out, err = finish(start("ppo_gated", folder, *arguments("ppo_gated", TOY), file_size=len(old) // 2))
     assert code == 1 and "Traceback" not in err
     assert err.strip() == f"error: --run-dir {folder}: cannot write there (File too large)"
     assert (folder / "checkpoint.pt").read_bytes() == old
