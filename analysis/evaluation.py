@@ -26,6 +26,8 @@ CHUNK = 128
 EVALUATION_INFO = ("growing_season_days", "latent_heat_mj_m2", "ground_shortwave_mj_m2")
 EVALUATION_COLUMNS = ("policy", "preference", "episode", "seed", "site_seed", "carbon_return", "thaw_return",
                       "scalarized_return", *EVALUATION_INFO)
+# One more column for agents trained on another thaw formulation: the thaw return of the same episodes under it.
+ASYMMETRIC = "asymmetric_thaw_return"
 
 
 def action_masks(envs: gym.vector.VectorEnv, observations: np.ndarray, env_id: str) -> np.ndarray:
@@ -128,8 +130,9 @@ def evaluate(args, env_kwargs: dict, policy, weights=None, policies=POLICIES):
     """Evaluate a policy: every weight on the same episodes, by its most probable actions and by sampled ones.
 
     policy: a function of observations (n, d) float32, masks (n, 25) bool and accrued returns (n, 2), giving
-    action probabilities (n, 25). Returns the table of episodes (EVALUATION_COLUMNS) and the statistics of the
-    annual record over the episodes of each weight (None if the environment keeps no such record).
+    action probabilities (n, 25). Returns the table of episodes (EVALUATION_COLUMNS; with a thaw formulation other
+    than asymmetric also ASYMMETRIC) and the statistics of the annual record over the episodes of each weight (None
+    if the environment keeps no such record).
     """
     weights = args.eval_weights if weights is None else weights
     # A greedy policy in site-specific mode does the same in every episode.
@@ -151,13 +154,23 @@ def evaluate(args, env_kwargs: dict, policy, weights=None, policies=POLICIES):
             ):
                 if "years" in report:
                     records[weight].append(report.pop("years"))
+                if args.thaw_formulation != "asymmetric":
+                    report[ASYMMETRIC] = asymmetric_thaw_return(records[weight][-1])
                 rows.append({"policy": kind, "preference": weight, "episode": episode, "seed": seed,
                              "carbon_return": carbon, "thaw_return": thaw,
                              "scalarized_return": scalarize(carbon, thaw, weight), **report})
             progress.show(len(rows))
         years += [summarize_years(kind, weight, record) for weight, record in records.items() if record]
-    table = pd.DataFrame(rows, columns=EVALUATION_COLUMNS)
+    other_formulation = (ASYMMETRIC,) if args.thaw_formulation != "asymmetric" else ()
+    table = pd.DataFrame(rows, columns=(*EVALUATION_COLUMNS, *other_formulation))
     return table, pd.concat(years, ignore_index=True) if years else None
+
+
+def asymmetric_thaw_return(record: dict) -> float:
+    """Thaw return of an episode's annual record under the paper's asymmetric reward, whatever it was played for."""
+    rewards = boreal_env.thaw_reward(record["boundary_cooling_mj_m2"], record["boundary_warming_mj_m2"],
+                                     boreal_env.Reward(), "asymmetric")
+    return float(np.clip(rewards, -1, 1).sum())
 
 
 def summarize_years(policy: str, weight: float, records: list[dict]) -> pd.DataFrame:

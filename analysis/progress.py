@@ -14,21 +14,23 @@ class Progress:
     `returns` holds the [carbon, thaw] returns of the last episodes, whose mean the line shows.
     """
 
-    def __init__(self, label: str, total: int, unit: str):
-        self.label, self.total, self.unit = label, total, unit
+    def __init__(self, label: str, total: int, unit: str, done: int = 0):
+        """done: what an earlier process has done of it."""
+        self.label, self.total, self.unit, self.done_before = label, total, unit, done
         self.terminal = sys.stdout.isatty()
         self.interval = 0.5 if self.terminal else 10.0
         self.start = time.perf_counter()
         self.shown = -np.inf
         self.returns = deque(maxlen=100)
 
-    def show(self, done: int) -> None:
-        """Show the line if it is time to, and always at the end."""
+    def show(self, done: int, last: bool = False) -> None:
+        """Show the line if it is time to, and always at the end; last: no more comes, though less than the total."""
         now = time.perf_counter()
-        if now - self.shown < self.interval and done < self.total:
+        last = last or done >= self.total
+        if now - self.shown < self.interval and not last:
             return
         self.shown = now
-        rate = done / (now - self.start)
+        rate = (done - self.done_before) / (now - self.start)
         line = (f"{self.label} {done:,}/{self.total:,} {self.unit}, {rate:,.0f}/s, "
                 f"{(self.total - done) / rate / 60:.1f} min left")
         if self.returns:
@@ -36,6 +38,6 @@ class Progress:
             line += f", carbon {carbon:+.2f}, thaw {thaw:+.2f}"
         if self.terminal:
             width = shutil.get_terminal_size().columns - 1
-            print("\r" + line[:width].ljust(width), end="\n" if done >= self.total else "", flush=True)
+            print("\r" + line[:width].ljust(width), end="\n" if last else "", flush=True)
         else:
             print(line, flush=True)

@@ -13,7 +13,7 @@ from analysis import protocol
 
 @dataclass
 class Args:
-    """Evaluates a fixed strategy under the protocol of the trained agents and leaves a run folder."""
+    """Evaluates a strategy that does not learn under the protocol of the trained agents and leaves a run folder."""
 
     seed: int = 1
     """names the run's folder: the strategy has nothing random, and its episodes are always the same"""
@@ -36,24 +36,26 @@ class Args:
 
 
 def main(script: str, policy) -> None:
-    """Evaluate `policy`, a function of observations (n, d) giving actions (n,), as the script of that name.
+    """Evaluate `policy`, a function of observations (n, d) and masks (n, 25), as the script of that name.
 
-    A fixed strategy does not look at the preference and has no other policy when sampled. Its episodes are
-    therefore the same under every weight, and are simulated once.
+    It gives actions (n,), or probabilities of actions (n, 25), and does not look at the preference: its episodes
+    are the same under every weight, and are simulated once. None has another policy when greedy: random actions
+    stay random.
     """
     args = protocol.parse(Args)
     env_kwargs = protocol.prepare(args)
     if args.env_id not in protocol.MODES:
         protocol.fail(f"--env-id must be one of {', '.join(protocol.MODES)}, not {args.env_id}")
-    run = protocol.Run(args, Path(script).stem)
 
     def action_probabilities(observations, masks, accrued_returns):
-        return np.eye(25)[policy(observations)]
+        chosen = policy(observations, masks)
+        return np.eye(25)[chosen] if chosen.ndim == 1 else chosen
 
-    start = time.perf_counter()
-    episodes, years = protocol.evaluate(args, env_kwargs, action_probabilities, (0.0,), ("sampled",))
-    run.time("evaluation", 0, time.perf_counter() - start)
-    run.finish(repeat(episodes, args.eval_weights), repeat(years, args.eval_weights))
+    with protocol.Run(args, Path(script).stem) as run:
+        start = time.perf_counter()
+        episodes, years = protocol.evaluate(args, env_kwargs, action_probabilities, (0.0,), ("sampled",))
+        run.time("evaluation", 0, time.perf_counter() - start)
+        run.finish(repeat(episodes, args.eval_weights), repeat(years, args.eval_weights))
 
 
 def repeat(table: pd.DataFrame, weights) -> pd.DataFrame:

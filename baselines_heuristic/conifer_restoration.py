@@ -5,9 +5,9 @@ import numpy as np
 from baselines_heuristic import main, target_density
 
 
-def policy(observations: np.ndarray) -> np.ndarray:
+def policy(observations: np.ndarray, masks: np.ndarray) -> np.ndarray:
     """Actions (n,) for observations (n, d): target density with mix index 4 (1.0)."""
-    return target_density.policy(observations, mix_index=4)
+    return target_density.policy(observations, masks, mix_index=4)
 
 
 if __name__ == "__main__":

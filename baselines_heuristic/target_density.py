@@ -7,7 +7,7 @@ from baselines_heuristic import main
 TARGET_STEMS_HA = 1000
 
 
-def policy(observations: np.ndarray, mix_index: int = 2) -> np.ndarray:
+def policy(observations: np.ndarray, masks: np.ndarray, mix_index: int = 2) -> np.ndarray:
     """Actions (n,) for observations (n, d): the density change among -100 .. +100 nearest to what is missing.
 
     Within 25 stems/ha of the target the nearest change is none: the dead band.

@@ -5,7 +5,7 @@ import numpy as np
 from baselines_heuristic import main
 
 
-def policy(observations: np.ndarray) -> np.ndarray:
+def policy(observations: np.ndarray, masks: np.ndarray) -> np.ndarray:
     """Actions (n,) for observations (n, d): density index 2 (no change)."""
     return np.full(len(observations), 12)
 

@@ -1,14 +1,12 @@
-# Curriculum PPO: preference-conditioned PPO with a gated, masked policy, trained on a part of the episodes.
-# Without the blocks marked CURRICULUM this is gated PPO. Its skeleton is that of CleanRL's ppo.py.
+# Curriculum PPO: gated PPO trained on a part of the episodes, chosen by their site.
+# Without the blocks marked CURRICULUM (a paragraph, or a class, each) this is ppo_gated.py. Skeleton: CleanRL's ppo.py.
 import math
 import random
 import time
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
-import gymnasium as gym
 import numpy as np
 import torch
 import torch.nn as nn
@@ -21,7 +19,7 @@ from analysis import protocol
 
 @dataclass
 class Args:
-    """Curriculum PPO on the boreal forest environments: trains, evaluates and leaves a run folder."""
+    """Gated PPO with a curriculum: trains on chosen episodes, evaluates, and leaves a run folder."""
 
     seed: int = 1
     """seed of the run: agent, sampling and training episodes"""
@@ -80,6 +78,10 @@ class Args:
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False
     """start over in a folder that already holds a run"""
+    track: tuple[Literal["tensorboard", "wandb"], ...] = ()
+    """follow the run's tables in TensorBoard (files in the run's folder) or Weights & Biases"""
+    wandb_project_name: str = "borearl"
+    """project of Weights & Biases"""
 
 
 def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
@@ -148,6 +150,34 @@ def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda
     return advantages
 
 
+def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value, args):
+    """Policy loss, value loss, entropy, two estimates of the KL divergence and clip fraction of a minibatch."""
+    _, logprob, entropy, value = agent.get_action_and_value(x, mask, action)
+    value = value.view(-1)
+    logratio = logprob - old_logprob
+    ratio = logratio.exp()
+
+    # Policy loss
+    if args.norm_adv and len(advantage) > 1:
+        advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+    pg_loss1 = -advantage * ratio
+    pg_loss2 = -advantage * torch.clamp(ratio, 1 - args.clip_coef, 1 + args.clip_coef)
+    pg_loss = torch.max(pg_loss1, pg_loss2).mean()
+
+    # Value loss
+    v_loss = (value - target) ** 2
+    if args.clip_vloss:
+        v_clipped = old_value + torch.clamp(value - old_value, -args.clip_coef, args.clip_coef)
+        v_loss = torch.max(v_loss, (v_clipped - target) ** 2)
+    v_loss = 0.5 * v_loss.mean()
+
+    with torch.no_grad():
+        # http://joschu.net/blog/kl-approx.html
+        old_kl, kl = -logratio.mean(), (ratio - 1 - logratio).mean()
+        clipfrac = ((ratio - 1).abs() > args.clip_coef).float().mean()
+    return pg_loss, v_loss, entropy.mean(), old_kl, kl, clipfrac
+
+
 # CURRICULUM
 class Curriculum:
     """Chooses the episodes to train on: those whose site a fixed random network scores above a threshold.
@@ -213,206 +243,179 @@ if __name__ == "__main__":
     episode_columns += ("score", "threshold", "selected")
     update_columns += ("threshold", "selected_episodes", "skipped_episodes", "selected_transitions")
 
-    run = protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns)
+    with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
+        # TRY NOT TO MODIFY: seeding
+        random.seed(args.seed)
+        np.random.seed(args.seed)
+        torch.manual_seed(args.seed)
+        torch.set_num_threads(1)
 
-    # TRY NOT TO MODIFY: seeding
-    random.seed(args.seed)
-    np.random.seed(args.seed)
-    torch.manual_seed(args.seed)
-    torch.set_num_threads(1)
+        # env setup
+        if args.env_id in protocol.MODES:
+            print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
+            boreal_env.warm_up(args.num_envs if args.vectorization == "lockstep" else 1)  # before workers are forked
+        envs = run.make_envs(env_kwargs)
 
-    # env setup
-    if args.env_id in protocol.MODES:
-        print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-        boreal_env.warm_up(args.num_envs if args.vectorization == "lockstep" else 1)  # before workers are forked
-    make_env = partial(gym.make, args.env_id, disable_env_checker=True, **env_kwargs)
-    if args.vectorization == "async":
-        envs = gym.vector.AsyncVectorEnv([make_env] * args.num_envs,
-                                         autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
-    else:
-        envs = gym.make_vec(args.env_id, num_envs=args.num_envs, **env_kwargs)
+        agent = Agent(envs)
+        optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
 
-    agent = Agent(envs)
-    optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+        # TRY NOT TO MODIFY: start the game
+        first_iteration, global_step, episode = 1, 0, 0
+        start_seed = args.seed * protocol.MAX_ENVS
+        next_obs, _ = envs.reset(seed=[start_seed + i for i in range(args.num_envs)])
+        next_done = np.zeros(args.num_envs, dtype=bool)
+        episode_returns = np.zeros((args.num_envs, 2))
+        # CURRICULUM: of the episode under way in each environment
+        curriculum = Curriculum(next_obs.shape[1], args.seed, args.threshold, args.raw_selector)
+        scores, thresholds = curriculum.score(next_obs), np.full(args.num_envs, curriculum.threshold)
+        selected = scores > thresholds
 
-    # TRY NOT TO MODIFY: start the game
-    global_step, episode = 0, 0
-    start_seed = args.seed * protocol.MAX_ENVS
-    next_obs, _ = envs.reset(seed=[start_seed + i for i in range(args.num_envs)])
-    next_done = np.zeros(args.num_envs, dtype=bool)
-    episode_returns = np.zeros((args.num_envs, 2))
-    # CURRICULUM: of the episode under way in each environment
-    curriculum = Curriculum(next_obs.shape[1], args.seed, args.threshold, args.raw_selector)
-    scores, thresholds = curriculum.score(next_obs), np.full(args.num_envs, curriculum.threshold)
-    selected = scores > thresholds
-
-    # every environment makes the same number of steps, so num_envs may leave a few of the total over
-    steps_per_env = args.total_timesteps // args.num_envs
-    rollout_length = args.rollout_steps // args.num_envs
-    num_iterations = math.ceil(steps_per_env / rollout_length)
-    progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps")
-
-    for iteration in range(1, num_iterations + 1):
-        # ALGO Logic: Storage setup (the last rollout may be shorter)
-        num_steps = min(rollout_length, steps_per_env - global_step // args.num_envs)
-        obs = torch.zeros((num_steps, args.num_envs) + envs.single_observation_space.shape)
-        masks = torch.zeros((num_steps, args.num_envs, 25), dtype=torch.bool)
-        actions = torch.zeros((num_steps, args.num_envs), dtype=torch.long)
-        logprobs = torch.zeros((num_steps, args.num_envs))
-        rewards = torch.zeros((num_steps, args.num_envs))
-        dones = torch.zeros((num_steps, args.num_envs))
-        values = torch.zeros((num_steps, args.num_envs))
-        rollout_start, env_seconds = time.perf_counter(), 0.0
-        # CURRICULUM
-        selecteds = torch.zeros((num_steps, args.num_envs), dtype=torch.bool)
-
-        for step in range(num_steps):
-            global_step += args.num_envs
-            obs[step] = torch.from_numpy(next_obs)
-            masks[step] = torch.from_numpy(protocol.action_masks(envs, next_obs, args.env_id))
-            dones[step] = torch.from_numpy(next_done)
+        # RESUME: all is as when the checkpoint was written
+        if state := run.resume():
+            agent.load_state_dict(state["agent"])
+            optimizer.load_state_dict(state["optimizer"])
+            first_iteration, global_step, episode = state["iteration"] + 1, state["global_step"], state["episode"]
+            next_obs, next_done, episode_returns = state["next_obs"], state["next_done"], state["episode_returns"]
             # CURRICULUM
-            selecteds[step] = torch.from_numpy(selected)
+            vars(curriculum).update(state["curriculum"])
+            scores, thresholds, selected = state["scores"], state["thresholds"], state["selected"]
 
-            # ALGO LOGIC: action logic
-            with torch.no_grad():
-                action, logprob, _, value = agent.get_action_and_value(obs[step], masks[step])
-                values[step] = value.flatten()
-            actions[step] = action
-            logprobs[step] = logprob
+        # every environment makes the same number of steps, so num_envs may leave a few of the total over
+        steps_per_env = args.total_timesteps // args.num_envs
+        rollout_length = args.rollout_steps // args.num_envs
+        num_iterations = math.ceil(steps_per_env / rollout_length)
+        progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps", global_step)
 
-            # TRY NOT TO MODIFY: execute the game and log data.
-            preferences = next_obs[:, 0].astype(np.float64)
-            env_start = time.perf_counter()
-            next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
-            env_seconds += time.perf_counter() - env_start
-            next_done = terminations | truncations
-            episode_returns += reward
-            scalarized = protocol.scalarize(reward[:, 0], reward[:, 1], preferences)
-            rewards[step] = torch.from_numpy(scalarized)
+        for iteration in range(first_iteration, num_iterations + 1):
+            # ALGO Logic: Storage setup (the last rollout may be shorter)
+            num_steps = min(rollout_length, steps_per_env - global_step // args.num_envs)
+            obs = torch.zeros((num_steps, args.num_envs) + envs.single_observation_space.shape)
+            masks = torch.zeros((num_steps, args.num_envs, 25), dtype=torch.bool)
+            actions = torch.zeros((num_steps, args.num_envs), dtype=torch.long)
+            logprobs = torch.zeros((num_steps, args.num_envs))
+            rewards = torch.zeros((num_steps, args.num_envs))
+            dones = torch.zeros((num_steps, args.num_envs))
+            values = torch.zeros((num_steps, args.num_envs))
+            rollout_start, env_seconds = time.perf_counter(), 0.0
+            # CURRICULUM
+            selecteds = torch.zeros((num_steps, args.num_envs), dtype=torch.bool)
 
-            for i in np.flatnonzero(next_done):
-                episode += 1
-                carbon, thaw = episode_returns[i]
-                scalarized_return = protocol.scalarize(carbon, thaw, preferences[i])
-                row = {"global_step": global_step, "episode": episode, "env": i, "preference": preferences[i],
-                       "carbon_return": carbon, "thaw_return": thaw, "scalarized_return": scalarized_return,
-                       **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO))}
-                # CURRICULUM: note the episode that ended, choose whether to train on the one that begins
-                row |= {"score": scores[i], "threshold": thresholds[i], "selected": int(selected[i])}
-                curriculum.finished.append((preferences[i], scalarized_return, selected[i]))
-                scores[i], thresholds[i] = curriculum.score(next_obs[i : i + 1])[0], curriculum.threshold
-                selected[i] = scores[i] > thresholds[i]
+            for step in range(num_steps):
+                global_step += args.num_envs
+                obs[step] = torch.from_numpy(next_obs)
+                masks[step] = torch.from_numpy(protocol.action_masks(envs, next_obs, args.env_id))
+                dones[step] = torch.from_numpy(next_done)
+                # CURRICULUM
+                selecteds[step] = torch.from_numpy(selected)
 
-                run.log("episodes", row)
-                progress.returns.append((carbon, thaw))
-                episode_returns[i] = 0
-            progress.show(global_step)
-        run.time("environment", global_step, env_seconds)
-        run.time("rollout", global_step, time.perf_counter() - rollout_start)
-        update_start = time.perf_counter()
-
-        # advantages, and bootstrap values of the episodes that the rollout cuts
-        with torch.no_grad():
-            next_value = agent.get_value(torch.from_numpy(next_obs)).flatten()
-        last_done = torch.from_numpy(next_done).float()
-        advantages = compute_gae(rewards, values, dones, next_value, last_done, args.gamma, args.gae_lambda)
-        returns = advantages + values
-
-        # flatten the batch
-        b_obs = obs.flatten(0, 1)
-        b_masks = masks.flatten(0, 1)
-        b_logprobs = logprobs.flatten()
-        b_actions = actions.flatten()
-        b_advantages = advantages.flatten()
-        b_returns = returns.flatten()
-        b_values = values.flatten()
-        b_inds = np.arange(num_steps * args.num_envs)
-        # CURRICULUM: skipped episodes are in no gradient; a rollout without selected ones has no update
-        b_inds = b_inds[selecteds.flatten().numpy()]
-
-        # Optimizing the policy and value network
-        num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
-        losses = []
-        y_pred, y_true = b_values[b_inds], b_returns[b_inds]
-        for epoch in range(args.update_epochs):
-            np.random.shuffle(b_inds)
-            for minibatch in range(num_minibatches):
-                mb_inds = b_inds[minibatch::num_minibatches]
-                _, newlogprob, entropy, newvalue = agent.get_action_and_value(
-                    b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds]
-                )
-                logratio = newlogprob - b_logprobs[mb_inds]
-                ratio = logratio.exp()
-
-                mb_advantages = b_advantages[mb_inds]
-                if args.norm_adv and len(mb_inds) > 1:
-                    mb_advantages = (mb_advantages - mb_advantages.mean()) / (mb_advantages.std() + 1e-8)
-
-                # Policy loss
-                pg_loss1 = -mb_advantages * ratio
-                pg_loss2 = -mb_advantages * torch.clamp(ratio, 1 - args.clip_coef, 1 + args.clip_coef)
-                pg_loss = torch.max(pg_loss1, pg_loss2).mean()
-
-                # Value loss
-                newvalue = newvalue.view(-1)
-                v_loss = (newvalue - b_returns[mb_inds]) ** 2
-                if args.clip_vloss:
-                    v_clipped = b_values[mb_inds] + torch.clamp(
-                        newvalue - b_values[mb_inds], -args.clip_coef, args.clip_coef
-                    )
-                    v_loss = torch.max(v_loss, (v_clipped - b_returns[mb_inds]) ** 2)
-                v_loss = 0.5 * v_loss.mean()
-
-                entropy_loss = entropy.mean()
-                loss = pg_loss - args.ent_coef * entropy_loss + args.vf_coef * v_loss
-
-                optimizer.zero_grad()
-                loss.backward()
-                nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
-                optimizer.step()
-
+                # ALGO LOGIC: action logic
                 with torch.no_grad():
-                    # http://joschu.net/blog/kl-approx.html
-                    old_kl, kl = -logratio.mean(), (ratio - 1 - logratio).mean()
-                    clipfrac = ((ratio - 1).abs() > args.clip_coef).float().mean()
-                    losses.append(torch.stack([pg_loss, v_loss, entropy_loss, old_kl, kl, clipfrac]).numpy())
+                    action, logprob, _, value = agent.get_action_and_value(obs[step], masks[step])
+                    values[step] = value.flatten()
+                actions[step] = action
+                logprobs[step] = logprob
 
-        # TRY NOT TO MODIFY: record the update; means over its minibatches
-        row = {"iteration": iteration, "global_step": global_step}
-        if losses:
-            row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0), strict=True))
-            row["explained_variance"] = (1 - (y_true - y_pred).var() / y_true.var()).item()
-        # CURRICULUM: the threshold of the next rollout's episodes
-        num_selected, num_skipped = curriculum.update_threshold()
-        row |= {"threshold": curriculum.threshold, "selected_episodes": num_selected,
-                "skipped_episodes": num_skipped, "selected_transitions": len(b_inds)}
+                # TRY NOT TO MODIFY: execute the game and log data.
+                preferences = next_obs[:, 0].astype(np.float64)
+                env_start = time.perf_counter()
+                next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
+                env_seconds += time.perf_counter() - env_start
+                next_done = terminations | truncations
+                episode_returns += reward
+                scalarized = protocol.scalarize(reward[:, 0], reward[:, 1], preferences)
+                rewards[step] = torch.from_numpy(scalarized)
 
-        run.log("updates", row)
-        run.time("update", global_step, time.perf_counter() - update_start)
+                for i in np.flatnonzero(next_done):
+                    episode += 1
+                    carbon, thaw = episode_returns[i]
+                    scalarized_return = protocol.scalarize(carbon, thaw, preferences[i])
+                    row = {"global_step": global_step, "episode": episode, "env": i, "preference": preferences[i],
+                           "carbon_return": carbon, "thaw_return": thaw, "scalarized_return": scalarized_return,
+                           **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO))}
+                    # CURRICULUM: note the episode that ended, choose whether to train on the one that begins
+                    row |= {"score": scores[i], "threshold": thresholds[i], "selected": int(selected[i])}
+                    curriculum.finished.append((preferences[i], scalarized_return, selected[i]))
+                    scores[i], thresholds[i] = curriculum.score(next_obs[i : i + 1])[0], curriculum.threshold
+                    selected[i] = scores[i] > thresholds[i]
 
-        checkpoint = {
-            "agent": agent.state_dict(), "optimizer": optimizer.state_dict(),
-            "iteration": iteration, "global_step": global_step, "episode": episode,
-            "next_obs": next_obs, "next_done": next_done, "episode_returns": episode_returns,
-            "random_states": (random.getstate(), np.random.get_state(), torch.get_rng_state()),
-            "envs": protocol.environment_state(envs, args.env_id), "table_sizes": run.table_sizes(),
-        }
-        # CURRICULUM
-        checkpoint |= {"curriculum": vars(curriculum), "scores": scores, "thresholds": thresholds,
-                       "selected": selected}
+                    run.log("episodes", row)
+                    progress.returns.append((carbon, thaw))
+                    episode_returns[i] = 0
+                progress.show(global_step)
+            run.time("environment", global_step, env_seconds)
+            run.time("rollout", global_step, time.perf_counter() - rollout_start)
+            update_start = time.perf_counter()
 
-        with protocol.replacing(run.folder / "checkpoint.pt") as file:
-            torch.save(checkpoint, file)
+            # advantages, and bootstrap values of the episodes that the rollout cuts
+            with torch.no_grad():
+                next_value = agent.get_value(torch.from_numpy(next_obs)).flatten()
+            last_done = torch.from_numpy(next_done).float()
+            advantages = compute_gae(rewards, values, dones, next_value, last_done, args.gamma, args.gae_lambda)
+            returns = advantages + values
 
-    envs.close()
+            # flatten the batch
+            b_obs = obs.flatten(0, 1)
+            b_masks = masks.flatten(0, 1)
+            b_logprobs = logprobs.flatten()
+            b_actions = actions.flatten()
+            b_advantages = advantages.flatten()
+            b_returns = returns.flatten()
+            b_values = values.flatten()
+            b_inds = np.arange(num_steps * args.num_envs)
+            # CURRICULUM: skipped episodes are in no gradient; a rollout without selected ones has no update
+            b_inds = b_inds[selecteds.flatten().numpy()]
 
-    def action_probabilities(observations, masks, accrued_returns):
-        with torch.no_grad():
-            distribution = agent.get_distribution(torch.from_numpy(observations), torch.from_numpy(masks))
-        return distribution.probs.numpy()
+            # Optimizing the policy and value network
+            num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
+            losses = []
+            y_pred, y_true = b_values[b_inds], b_returns[b_inds]
+            for epoch in range(args.update_epochs):
+                np.random.shuffle(b_inds)
+                for minibatch in range(num_minibatches):
+                    mb_inds = b_inds[minibatch::num_minibatches]
+                    parts = ppo_losses(
+                        agent, b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds], b_logprobs[mb_inds],
+                        b_advantages[mb_inds], b_returns[mb_inds], b_values[mb_inds], args
+                    )
+                    pg_loss, v_loss, entropy = parts[:3]
+                    loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
 
-    evaluation_start = time.perf_counter()
-    evaluation, years = protocol.evaluate(args, env_kwargs, action_probabilities)
-    run.time("evaluation", global_step, time.perf_counter() - evaluation_start)
-    run.finish(evaluation, years)
+                    optimizer.zero_grad()
+                    loss.backward()
+                    nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
+                    optimizer.step()
+                    losses.append(torch.stack(parts).detach().numpy())
+
+            # TRY NOT TO MODIFY: record the update; means over its minibatches
+            row = {"iteration": iteration, "global_step": global_step}
+            if losses:
+                row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0), strict=True))
+                row["explained_variance"] = (1 - (y_true - y_pred).var() / y_true.var()).item()
+            # CURRICULUM: the threshold of the next rollout's episodes
+            num_selected, num_skipped = curriculum.update_threshold()
+            row |= {"threshold": curriculum.threshold, "selected_episodes": num_selected,
+                    "skipped_episodes": num_skipped, "selected_transitions": len(b_inds)}
+
+            run.log("updates", row)
+            run.time("update", global_step, time.perf_counter() - update_start)
+
+            state = {
+                "agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
+                "episode": episode, "next_obs": next_obs, "next_done": next_done, "episode_returns": episode_returns,
+            }
+            # CURRICULUM
+            state |= {"curriculum": vars(curriculum), "scores": scores, "thresholds": thresholds, "selected": selected}
+
+            run.save(global_step, last=iteration == num_iterations, **state)
+
+        envs.close()
+
+        def action_probabilities(observations, masks, accrued_returns):
+            with torch.no_grad():
+                distribution = agent.get_distribution(torch.from_numpy(observations), torch.from_numpy(masks))
+            return distribution.probs.numpy()
+
+        evaluation_start = time.perf_counter()
+        evaluation, years = protocol.evaluate(args, env_kwargs, action_probabilities)
+        run.time("evaluation", global_step, time.perf_counter() - evaluation_start)
+        run.finish(evaluation, years)

@@ -4,9 +4,9 @@ import pytest
 from scripts import run_script
 
 from analysis import evaluation, protocol
-from baselines_heuristic import Args, conifer_restoration, plus_100, target_density, zero_change
+from baselines_heuristic import Args, conifer_restoration, plus_100, random_valid, target_density, zero_change
 
-SCRIPTS = ("zero_change", "plus_100", "target_density", "conifer_restoration")
+SCRIPTS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 
 
 def observe(*densities):
@@ -16,8 +16,8 @@ def observe(*densities):
 
 
 def test_fixed_actions():
-    assert zero_change.policy(observe(0, 1500)).tolist() == [12, 12]
-    assert plus_100.policy(observe(0, 1500)).tolist() == [22, 22]
+    assert zero_change.policy(observe(0, 1500), None).tolist() == [12, 12]
+    assert plus_100.policy(observe(0, 1500), None).tolist() == [22, 22]
 
 
 @pytest.mark.parametrize("density, change", [
@@ -26,8 +26,14 @@ def test_fixed_actions():
 ])
 def test_target_density(density, change):
     index = (-100, -50, 0, 50, 100).index(change)
-    assert target_density.policy(observe(density)).tolist() == [5 * index + 2]
-    assert conifer_restoration.policy(observe(density)).tolist() == [5 * index + 4]
+    assert target_density.policy(observe(density), None).tolist() == [5 * index + 2]
+    assert conifer_restoration.policy(observe(density), None).tolist() == [5 * index + 4]
+
+
+def test_random_is_uniform_over_the_valid_actions():
+    masks = np.zeros((2, 25), bool)
+    masks[0, :4], masks[1, 12] = True, True
+    np.testing.assert_array_equal(random_valid.policy(None, masks), masks / [[4], [1]])
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
@@ -49,7 +55,7 @@ def test_one_simulation_stands_for_every_weight(tmp_path):
     written = pd.read_csv(tmp_path / "evaluation.csv")
     args = Args(eval_episodes=2, eval_weights=(0.0, 0.7))
     simulated, _ = protocol.evaluate(args, protocol.prepare(args), lambda observations, masks, returns:
-                                     np.eye(25)[target_density.policy(observations)])
+                                     np.eye(25)[target_density.policy(observations, masks)])
     pd.testing.assert_frame_equal(written, simulated, rtol=1e-8, check_dtype=False)
 
 

@@ -137,6 +137,19 @@ def test_a_greedy_policy_in_site_specific_mode_is_evaluated_once():
     assert episodes.policy.value_counts().to_dict() == {"sampled": 2, "greedy": 1}
 
 
+def test_other_thaw_formulations_are_also_judged_by_the_asymmetric_one():
+    def plus_100(observations, masks, accrued_returns):
+        return np.eye(25)[np.full(len(observations), 22)]
+
+    given = dict(env_id="boreal-generalist-v0", eval_episodes=1, eval_weights=(0.5,))
+    own, _ = evaluate(plus_100, **given)
+    other, _ = evaluate(plus_100, thaw_formulation="contrast", **given)
+    assert tuple(own.columns) == evaluation.EVALUATION_COLUMNS
+    assert tuple(other.columns) == (*evaluation.EVALUATION_COLUMNS, evaluation.ASYMMETRIC)
+    np.testing.assert_allclose(other.asymmetric_thaw_return, own.thaw_return, rtol=1e-6)
+    assert not np.allclose(other.thaw_return, own.thaw_return)
+
+
 # --------------------------------------------------------------------------------------------- run folder
 
 
@@ -151,7 +164,6 @@ def test_rows_are_on_disk_at_once(tmp_path):
     run.log("episodes", {"step": np.int64(1), "value": 1 / 3})
     run.log("episodes", {"step": 2})
     assert (tmp_path / "run" / "episodes.csv").read_text() == "step,value\n1,0.333333333\n2,\n"
-    assert run.table_sizes() == {"episodes": 28}
     with pytest.raises(ValueError):
         run.log("episodes", {"steps": 3})
 
@@ -177,13 +189,27 @@ def test_other_arguments_are_refused_and_named(tmp_path):
     assert (tmp_path / "config.json").read_bytes() == before
 
 
-def test_unfinished_runs_are_refused_unless_overwritten(tmp_path):
-    make_run(tmp_path).log("episodes", {"step": 1, "value": 1.0})
-    with pytest.raises(SystemExit, match="unfinished.*--overwrite starts over"):
-        make_run(tmp_path)
-    make_run(tmp_path, overwrite=True, colour="blue")
+def test_a_run_without_a_checkpoint_starts_again_and_keeps_its_times(tmp_path):
+    run = make_run(tmp_path)
+    run.log("episodes", {"step": 1, "value": 1.0})
+    run.time("rollout", 1, 2.5)
+    with (tmp_path / "timing.csv").open("a") as file:
+        file.write("rollout,2,0")  # what a full disk may leave of a row
+    again = make_run(tmp_path)
+    assert again.checkpoint is None
     assert (tmp_path / "episodes.csv").read_text() == "step,value\n"
+    again.time("rollout", 1, 3.5)
+    timing = pd.read_csv(tmp_path / "timing.csv")
+    assert timing.seconds.tolist() == [2.5, 3.5] and timing.elapsed_seconds.is_monotonic_increasing
+
+
+def test_overwrite_starts_over(tmp_path):
+    make_run(tmp_path).time("rollout", 1, 2.5)
+    (tmp_path / "checkpoint.pt").write_bytes(b"of another run")
+    make_run(tmp_path, overwrite=True, colour="blue")
     assert json.loads((tmp_path / "config.json").read_text())["arguments"]["colour"] == "blue"
+    assert {path.name for path in tmp_path.iterdir()} == {"config.json", "episodes.csv", "timing.csv"}
+    assert len(pd.read_csv(tmp_path / "timing.csv")) == 0
 
 
 def test_foreign_folders_are_never_touched(tmp_path):

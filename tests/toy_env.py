@@ -20,10 +20,12 @@ def optimal_return(preference: float) -> float:
 class ToyEnv(gym.Env):
     """Observation: preference, share of the episode gone, ground full or not.
 
-    with_site: 105 entries, the last 62 of which are drawn in every episode and mean nothing.
+    with_site: 105 entries, the last 62 of which are drawn in every episode and mean nothing; offset: taken from
+    every reward, so that a policy gradient without a baseline does not settle for the first actions it tried.
     """
 
-    def __init__(self, with_site: bool = False):
+    def __init__(self, with_site: bool = False, offset: float = 0.0):
+        self.offset = offset
         self.size = 105 if with_site else 3
         self.observation_space = gym.spaces.Box(0, 1, (self.size,), np.float32)
         self.action_space = gym.spaces.Discrete(25)
@@ -56,9 +58,10 @@ class ToyEnv(gym.Env):
         mix = MIXES[action % 5]
         self.steps += 1
         self.full = self.np_random.random() < 0.5
-        reward = np.array([mix - cost, 1 - mix**2 - cost], dtype=np.float32)
+        reward = np.array([mix - cost, 1 - mix**2 - cost], dtype=np.float32) - np.float32(self.offset)
         return self._observation(), reward, self.steps == LENGTH, False, {}
 
 
 gym.register("toy-v0", entry_point="toy_env:ToyEnv")
 gym.register("toy-sites-v0", entry_point="toy_env:ToyEnv", kwargs={"with_site": True})
+gym.register("toy-centred-v0", entry_point="toy_env:ToyEnv", kwargs={"offset": 0.6})

@@ -1,0 +1,343 @@
+"""A run's folder: configuration, tables, checkpoint and results, and what is said when a run stops early."""
+
+import contextlib
+import csv
+import importlib.metadata
+import io
+import json
+import os
+import pickle
+import platform
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+
+from analysis import tracking, training_envs
+from analysis.arguments import FREE_ARGUMENTS, fail, not_default
+from analysis.summary import draw_summary, print_table
+
+try:
+    import fcntl
+except ImportError:  # Windows, where a folder is not locked
+    fcntl = None
+
+EPISODE_INFO = ("final_density", "mean_density", "final_conifer_fraction", "mean_conifer_fraction")
+EPISODE_COLUMNS = ("global_step", "episode", "env", "site_seed", "preference", "carbon_return", "thaw_return",
+                   "scalarized_return", *EPISODE_INFO)
+TIMING_COLUMNS = ("phase", "global_step", "seconds", "elapsed_seconds")
+# What a run makes, but for config.json and timing.csv. The first of them makes it a finished run.
+RESULTS = ("evaluation.csv", "checkpoint.pt", "episodes.csv", "updates.csv", "evaluation_years.csv", "summary.png")
+# Steps between checkpoints, at least: counted in steps, since by the clock the last one would differ each time.
+CHECKPOINT_STEPS = 2048
+FLOAT_FORMAT = "%.9g"
+
+
+@contextlib.contextmanager
+def replacing(path: Path):
+    """A binary file that takes the place of `path` when the block ends: nobody ever sees half of it."""
+    temporary = path.with_name(path.name + ".tmp")
+    try:
+        with open(temporary, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+class Table:
+    """A CSV file that grows by rows, each handed to the system at once: it outlives a killed process."""
+
+    def __init__(self, path: Path, columns, size: int = 0):
+        """size: bytes to keep of the table that is there; 0 starts a new one."""
+        self.columns = columns
+        # unbuffered: what a full disk refuses is not tried once more when the process ends
+        self.file = open(path, "r+b" if size else "wb", buffering=0)
+        self.file.truncate(size)
+        self.file.seek(size)
+        if not size:
+            self._append(dict(zip(columns, columns, strict=True)))
+
+    def write(self, row: dict) -> None:
+        """Append a row; columns that it lacks stay empty, one that the table lacks raises ValueError."""
+        self._append({name: FLOAT_FORMAT % value if isinstance(value, (float, np.floating)) else value
+                      for name, value in row.items()})
+
+    def _append(self, row: dict) -> None:
+        text = io.StringIO()
+        csv.DictWriter(text, self.columns, lineterminator="\n").writerow(row)
+        data = text.getvalue().encode()
+        while data:
+            data = data[self.file.write(data):]
+
+
+class Run:
+    """A run's folder: its configuration, its tables (given as name=columns), its checkpoint and its results.
+
+    Used as a context: a run that is stopped inside says in one line how to go on, and leaves no process behind.
+    A run is finished when `evaluation.csv` exists: it is written last. Exits with one line if the folder is
+    another run's, in use, damaged or not writable, or holds this run finished (exit 0).
+    """
+
+    def __init__(self, args, script: str, **tables):
+        self.args, self.script = args, script
+        changed = not_default(args)
+        name = "-".join([args.env_id.split(":")[-1].replace("/", "-"), *map(describe, changed.items())])
+        self.folder = Path(args.run_dir or Path("runs", script, name, f"seed{args.seed}"))
+        self.config = {
+            "script": script,
+            "arguments": {k: value for k, value in vars(args).items() if k not in FREE_ARGUMENTS},
+            "not_default": changed,
+            "versions": versions(),
+            "commit": commit(),
+        }
+        self.envs, self.checkpoint, self.checkpoint_step = None, None, 0
+        with self._writing():
+            self._claim_folder()
+            self._load_checkpoint()
+            sizes = self.checkpoint["table_sizes"] if self.checkpoint else {}
+            self.tables |= {name: Table(self.folder / f"{name}.csv", columns, sizes.get(name, 0))
+                            for name, columns in tables.items()}
+        self.trackers = tracking.start(args, script, self.folder, self.config, self.checkpoint_step)
+        print(f"{script}: {args.env_id}, seed {args.seed}, into {self.folder}", flush=True)
+        if self.checkpoint:
+            print(f"resuming at step {self.checkpoint_step:,}", flush=True)
+
+    # ------------------------------------------------------------------------------------- opening the folder
+
+    def _claim_folder(self) -> None:
+        """Make the folder this run's, and lock it by its timing.csv; what is there of this very run stays."""
+        config_file, timing_file = self.folder / "config.json", self.folder / "timing.csv"
+        # a file that a killed process left half-written does not make the folder another's
+        occupied = self.folder.is_dir() and any(not path.name.endswith(".tmp") for path in self.folder.iterdir())
+        if occupied and not config_file.exists():
+            fail(f"--run-dir {self.folder}: neither empty nor a run's folder (it has no config.json)")
+        if occupied and not self.args.overwrite:
+            self._compare(config_file)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if not occupied:
+            self._write_config()
+        timing_file.touch()
+        self.lock = open(timing_file, "r+b")
+        if fcntl is not None:
+            try:
+                fcntl.lockf(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                fail(f"{self.folder}: another process is at work on this run")
+        if occupied and self.args.overwrite:
+            for name in (*RESULTS, *tracking.FOLDERS):
+                remove(self.folder / name)
+            self.lock.truncate()
+            self._write_config()
+        # timing.csv keeps its rows; the time that this run took goes on from the last whole one
+        *rows, half_a_row = self.lock.read().split(b"\n")
+        earlier = float(rows[-1].split(b",")[-1]) if len(rows) > 1 else 0.0
+        self.start = time.perf_counter() - earlier
+        self.tables = {"timing": Table(timing_file, TIMING_COLUMNS, sum(len(row) + 1 for row in rows))}
+
+    def _write_config(self) -> None:
+        with replacing(self.folder / "config.json") as file:
+            file.write(json.dumps(self.config, indent=2).encode() + b"\n")
+
+    def _compare(self, config_file: Path) -> None:
+        """Exit if the folder's run has other arguments, or is finished; warn if it was made by other code."""
+        try:
+            config = json.loads(config_file.read_text(encoding="utf-8"))
+            there = {"script": config["script"], **config["arguments"]}
+            code_there = {**config["versions"], "commit": config["commit"]}
+        except (ValueError, KeyError, TypeError) as error:
+            fail(f"{config_file} is damaged ({error!r}); --overwrite starts over")
+        here = json.loads(json.dumps({"script": self.script, **self.config["arguments"]}))
+        if there != here:
+            fail(f"{self.folder} holds a run with other arguments: {differences(there, here)} "
+                 "(--run-dir names another folder, --overwrite starts over)")
+        if (self.folder / "evaluation.csv").exists():
+            print(f"{self.folder}: this run is finished (--overwrite starts over)")
+            sys.exit(0)
+        code_here = {**self.config["versions"], "commit": self.config["commit"]}
+        if code_there != code_here:
+            print(f"warning: {self.folder} was begun with {differences(code_there, code_here)}", file=sys.stderr)
+
+    # -------------------------------------------------------------------------------------------- checkpoints
+
+    def save(self, global_step: int, last: bool, **state) -> None:
+        """Write a checkpoint if it is the last one, or CHECKPOINT_STEPS steps have passed.
+
+        state: what the algorithm needs to go on; environments, generators and tables are added to it.
+        """
+        if global_step // CHECKPOINT_STEPS == self.checkpoint_step // CHECKPOINT_STEPS and not last:
+            return
+        import torch  # only here: the heuristics do without
+
+        start = time.perf_counter()
+        state |= {
+            "global_step": global_step,
+            "envs": training_envs.get_states(self.envs),
+            "random_states": (random.getstate(), np.random.get_state(), torch.get_rng_state()),
+            "table_sizes": {name: table.file.tell() for name, table in self.tables.items() if name != "timing"},
+        }
+        # first into memory: what torch says of a full disk is not an OSError
+        buffer = io.BytesIO()
+        torch.save(state, buffer, pickle_module=BY_VALUE)
+        with self._writing(), replacing(self.folder / "checkpoint.pt") as file:
+            file.write(buffer.getvalue())
+        self.checkpoint_step = global_step
+        self.time("checkpoint", global_step, time.perf_counter() - start)
+
+    def _load_checkpoint(self) -> None:
+        path = self.folder / "checkpoint.pt"
+        if not path.exists():
+            return
+        import torch
+
+        try:
+            with zipfile.ZipFile(path) as archive:
+                damaged = archive.testzip()  # torch does not look at the checksums that it wrote
+            checkpoint = None if damaged else torch.load(path, weights_only=False)
+        except (zipfile.BadZipFile, RuntimeError, EOFError, pickle.UnpicklingError) as error:
+            damaged = str(error).splitlines()[0]
+        if damaged:
+            fail(f"{path} is damaged ({damaged}); --overwrite starts over")
+        for name, size in checkpoint["table_sizes"].items():
+            table = self.folder / f"{name}.csv"
+            if not table.exists() or table.stat().st_size < size:
+                fail(f"{table} is shorter than when the checkpoint was written; --overwrite starts over")
+        if checkpoint["envs"] is None:
+            print(f"{self.args.env_id} has no get_state(): the interrupted run starts over", flush=True)
+            return
+        self.checkpoint, self.checkpoint_step = checkpoint, checkpoint["global_step"]
+
+    def resume(self) -> dict | None:
+        """Set environments and generators as in the checkpoint, and give its state; None if there is none."""
+        if self.checkpoint:
+            import torch
+
+            training_envs.set_states(self.envs, self.checkpoint["envs"])
+            python_state, numpy_state, torch_state = self.checkpoint["random_states"]
+            random.setstate(python_state)
+            np.random.set_state(numpy_state)
+            torch.set_rng_state(torch_state)
+        return self.checkpoint
+
+    # ------------------------------------------------------------------------------------------- while it runs
+
+    def make_envs(self, env_kwargs: dict):
+        """The vector environment to train on, which ends with the run."""
+        self.envs = training_envs.make_training_envs(self.args, env_kwargs)
+        return self.envs
+
+    def log(self, table: str, row: dict) -> None:
+        """Append a row to one of the run's tables."""
+        with self._writing():
+            self.tables[table].write(row)
+        for tracker in self.trackers:
+            tracker(table, row)
+
+    def time(self, phase: str, global_step: int, seconds: float) -> None:
+        """Append to timing.csv, the only file that depends on the clock."""
+        with self._writing():
+            self.tables["timing"].write({"phase": phase, "global_step": global_step, "seconds": seconds,
+                                         "elapsed_seconds": time.perf_counter() - self.start})
+
+    def finish(self, evaluation: pd.DataFrame, years: pd.DataFrame | None) -> None:
+        """Write the evaluation and the picture, print the table, and so declare the run finished."""
+        with self._writing():
+            if years is not None:
+                with replacing(self.folder / "evaluation_years.csv") as file:
+                    years.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+            with replacing(self.folder / "summary.png") as file:
+                title = f"{self.script}, {self.args.env_id}, seed {self.args.seed}"
+                draw_summary(file, title, evaluation, years, self.folder / "episodes.csv")
+            with replacing(self.folder / "evaluation.csv") as file:
+                evaluation.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+        print_table(evaluation)
+        print(f"{self.folder}: finished in {time.perf_counter() - self.start:.0f} s")
+
+    @contextlib.contextmanager
+    def _writing(self):
+        try:
+            yield
+        except OSError as error:
+            fail(f"--run-dir {self.folder}: cannot write there ({error.strerror})")
+
+    # ------------------------------------------------------------------------------------- when it stops early
+
+    def __enter__(self):
+        self.sigterm = signal.signal(signal.SIGTERM, signal.default_int_handler)
+        return self
+
+    def __exit__(self, kind, error, trace) -> None:
+        signal.signal(signal.SIGTERM, self.sigterm)
+        dead = training_envs.end(self.envs) if self.envs is not None else []
+        for table in self.tables.values():
+            table.file.close()
+        self.lock.close()
+        then = f"the same command goes on from step {self.checkpoint_step:,}" if self.checkpoint_step else \
+            "the same command starts it again"
+        if isinstance(error, KeyboardInterrupt):
+            print(f"\n{self.folder}: interrupted; {then}", file=sys.stderr)
+            sys.exit(130)
+        if isinstance(error, (EOFError, ConnectionError)) and dead:
+            fail(f"{'; '.join(dead)}; {then}")
+        if isinstance(error, Exception):
+            print(f"{self.folder}: stopped by an error; {then}", file=sys.stderr)
+
+
+class ByValue(pickle.Pickler):
+    """Writes every object in full: equal states give equal bytes, whether or not they share their parts."""
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, **kwargs)
+        self.fast = True
+
+
+BY_VALUE = SimpleNamespace(__name__="by_value", Pickler=ByValue)  # for torch, a pickle module
+
+
+def remove(path: Path) -> None:
+    """Remove a file or a folder, if it is there."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def differences(there: dict, here: dict) -> str:
+    """What differs between two dicts, by name."""
+    return "; ".join(f"{name} {there.get(name)} there, {here.get(name)} now"
+                     for name in {**there, **here} if there.get(name) != here.get(name))
+
+
+def describe(item) -> str:
+    """name=value of an argument, for the name of a folder."""
+    name, value = item
+    return f"{name}={','.join(f'{v:g}' for v in value) if isinstance(value, tuple) else value}"
+
+
+def versions() -> dict:
+    """Versions of Python and of the packages that the numbers depend on."""
+    packages = ("numpy", "numba", "gymnasium", "mo-gymnasium", "torch", "pandas", "matplotlib", "moocore")
+    found = {name: importlib.metadata.version(name) for name in packages}
+    return {"python": platform.python_version(), **found}
+
+
+def commit() -> str | None:
+    """The git commit of this checkout; None outside a checkout."""
+    root = Path(__file__).parents[1]
+    if not (root / ".git").exists():
+        return None
+    try:
+        head = subprocess.run(["git", "-C", root, "rev-parse", "HEAD"], capture_output=True, text=True)
+    except FileNotFoundError:
+        return None
+    return head.stdout.strip() if head.returncode == 0 else None

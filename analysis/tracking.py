@@ -1,0 +1,53 @@
+"""TensorBoard and Weights & Biases, for those who ask for them by --track: the run's tables, row by row."""
+
+from pathlib import Path
+
+import numpy as np
+
+FOLDERS = ("tensorboard", "wandb")  # of a run's folder, named like the trackers
+
+
+def numbers(table: str, row: dict) -> dict:
+    """The row's numbers, under names such as episodes/carbon_return."""
+    return {f"{table}/{name}": float(value) for name, value in row.items()
+            if isinstance(value, (int, float, np.number)) and name != "global_step"}
+
+
+def start(args, script: str, folder: Path, config: dict, first_step: int) -> list:
+    """The trackers that args.track names, each a function of a table's name and a row of it.
+
+    first_step: of a resumed run, the step that it goes on from.
+    """
+    return [TRACKERS[name](args, script, folder, config, first_step) for name in getattr(args, "track", ())]
+
+
+def tensorboard(args, script, folder, config, first_step):
+    """Event files in <run>/tensorboard."""
+    from torch.utils.tensorboard import SummaryWriter
+
+    writer = SummaryWriter(str(folder / "tensorboard"), purge_step=first_step + 1 if first_step else None)
+
+    def track(table: str, row: dict) -> None:
+        for name, value in numbers(table, row).items():
+            writer.add_scalar(name, value, row["global_step"])
+
+    return track
+
+
+def wandb(args, script, folder, config, first_step):
+    """A run of the project args.wandb_project_name; resumed, it goes on under the same id."""
+    import hashlib
+
+    import wandb
+
+    identity = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()[:16]
+    wandb.init(project=args.wandb_project_name, name=f"{script}-{args.env_id}-{args.seed}", config=config,
+               dir=str(folder), id=identity, resume="allow")
+
+    def track(table: str, row: dict) -> None:
+        wandb.log({"global_step": row["global_step"], **numbers(table, row)})
+
+    return track
+
+
+TRACKERS = {"tensorboard": tensorboard, "wandb": wandb}

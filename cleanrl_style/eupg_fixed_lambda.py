@@ -1,0 +1,242 @@
+# EUPG with fixed lambda: a policy gradient weighted by the utility of the whole episode's return, whose policy
+# sees the return accrued so far; one preference throughout. eupg_var_lambda.py draws one for each episode.
+# After Roijers, Steckelmacher and Nowe (2018). Its skeleton is that of CleanRL's scripts.
+import math
+import random
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+import torch.nn as nn
+import torch.optim as optim
+from torch.distributions.categorical import Categorical
+
+import boreal_env
+from analysis import protocol
+
+
+@dataclass
+class Args:
+    """EUPG with one preference: trains, evaluates at this preference, and leaves a run folder."""
+
+    seed: int = 1
+    """seed of the run: agent, sampling and training episodes"""
+    env_id: str | None = None
+    """boreal-generalist-v0, -balanced-v0 or -site-specific-v0, or module:id of your own (None: the mode's)"""
+    mode: Literal["generalist", "site-specific"] | None = None
+    """a new site and weather in every episode, or one fixed site (None: the environment's)"""
+    site_seed: int | None = None
+    """another fixed site, in site-specific mode"""
+    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
+    """formula of the thaw reward"""
+    total_timesteps: int | None = None
+    """steps, summed over all environments; episodes are played whole (None: 300000, in site-specific mode 100000)"""
+    num_envs: int | None = None
+    """number of environments, and of episodes in a batch; 1 is the paper's (None: 8 async, 32 lockstep)"""
+    vectorization: Literal["async", "lockstep"] = "async"
+    """one process per environment, or all environments in one compiled call"""
+    preference: float = 0.5
+    """carbon weight of every episode, in training and evaluation"""
+
+    # Algorithm: the paper's hyperparameters
+    learning_rate: float = 1e-3
+    """learning rate of Adam"""
+    gamma: float = 1.0
+    """discount factor"""
+    utility: Literal["total", "future"] = "total"
+    """what weights an action's gradient: utility of the episode's whole return, accrued and future; or of the future"""
+
+    # Evaluation and output
+    eval_episodes: int = 100
+    """evaluation episodes"""
+    run_dir: str | None = None
+    """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
+    overwrite: bool = False
+    """start over in a folder that already holds a run"""
+    track: tuple[Literal["tensorboard", "wandb"], ...] = ()
+    """follow the run's tables in TensorBoard (files in the run's folder) or Weights & Biases"""
+    wandb_project_name: str = "borearl"
+    """project of Weights & Biases"""
+
+
+def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
+    torch.nn.init.orthogonal_(layer.weight, std)
+    torch.nn.init.constant_(layer.bias, bias_const)
+    return layer
+
+
+class Agent(nn.Module):
+    """A policy of the observation and, at its end, of the return accrued so far in both objectives."""
+
+    def __init__(self, envs):
+        super().__init__()
+        observation_dim = np.array(envs.single_observation_space.shape).prod()
+        self.actor = nn.Sequential(
+            layer_init(nn.Linear(observation_dim + 2, 128)),
+            nn.Tanh(),
+            layer_init(nn.Linear(128, 64)),
+            nn.Tanh(),
+            layer_init(nn.Linear(64, 25), std=0.01),
+        )
+
+    def get_distribution(self, x, mask):
+        """x (n, observation + 2), mask (n, 25) bool, at least one action valid in each row."""
+        # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in the entropy
+        return Categorical(logits=torch.where(mask, self.actor(x), -1e8))
+
+    def get_action_and_value(self, x, mask, action=None):
+        """EUPG has no value: the last of the four is None."""
+        distribution = self.get_distribution(x, mask)
+        if action is None:
+            action = distribution.sample()
+        return action, distribution.log_prob(action), distribution.entropy(), None
+
+
+def policy_input(observations, accrued_returns):
+    """x of the agent (n, observation + 2), for observations (n, observation) and undiscounted returns (n, 2)."""
+    return torch.from_numpy(np.hstack([observations, accrued_returns / 50]).astype(np.float32))
+
+
+def compute_utilities(rewards, preferences, gamma, which):
+    """Utility (steps, n) that weights each step's gradient, of n episodes with rewards (steps, n, 2).
+
+    The utility of a return is its scalarisation by the episode's preference (n,). "total" is that of the whole
+    return, accrued before the step and future, the same for all steps; "future" that of what comes from the step on.
+    """
+    to_go = np.zeros_like(rewards)
+    future = np.zeros(rewards.shape[1:])
+    for t in reversed(range(len(rewards))):
+        to_go[t] = future = rewards[t] + gamma * future
+    returns = to_go if which == "future" else np.broadcast_to(to_go[0], to_go.shape)
+    return protocol.scalarize(returns[..., 0], returns[..., 1], preferences)
+
+
+def eupg_loss(agent, x, mask, action, utility):
+    """Loss whose gradient is EUPG's, without a baseline, and the policy's mean entropy."""
+    _, logprob, entropy, _ = agent.get_action_and_value(x, mask, action)
+    return -(logprob * utility).mean(), entropy.mean()
+
+
+if __name__ == "__main__":
+    args = protocol.parse(Args)
+    env_kwargs = protocol.prepare(args)
+    episode_columns = protocol.EPISODE_COLUMNS
+    update_columns = ("iteration", "global_step", "policy_loss", "entropy", "gradient_norm", "utility_mean",
+                      "utility_std")
+
+    with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
+        # TRY NOT TO MODIFY: seeding
+        random.seed(args.seed)
+        np.random.seed(args.seed)
+        torch.manual_seed(args.seed)
+        torch.set_num_threads(1)
+
+        # env setup
+        if args.env_id in protocol.MODES:
+            print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
+            boreal_env.warm_up(args.num_envs if args.vectorization == "lockstep" else 1)  # before workers are forked
+        envs = run.make_envs(env_kwargs)
+
+        agent = Agent(envs)
+        optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate)
+
+        # TRY NOT TO MODIFY: start the game
+        iteration, global_step, episode, batch_steps = 0, 0, 0, 0
+        start_seed = args.seed * protocol.MAX_ENVS
+        next_obs, _ = envs.reset(seed=[start_seed + i for i in range(args.num_envs)])
+
+        # RESUME: all is as when the checkpoint was written
+        if state := run.resume():
+            agent.load_state_dict(state["agent"])
+            optimizer.load_state_dict(state["optimizer"])
+            iteration, global_step, episode = state["iteration"], state["global_step"], state["episode"]
+            next_obs, batch_steps = state["next_obs"], state["batch_steps"]
+
+        progress = protocol.Progress("training", args.total_timesteps, "steps", global_step)
+
+        # a batch is an episode of every environment; the last one is the last that the total has room for
+        while global_step + batch_steps <= args.total_timesteps:
+            iteration += 1
+            obs, masks, actions, rewards = [], [], [], []
+            next_done = np.zeros(args.num_envs, dtype=bool)
+            episode_returns = np.zeros((args.num_envs, 2))
+            rollout_start, env_seconds = time.perf_counter(), 0.0
+
+            while not next_done.any():
+                global_step += args.num_envs
+                obs.append(policy_input(next_obs, episode_returns))
+                masks.append(torch.from_numpy(protocol.action_masks(envs, next_obs, args.env_id)))
+
+                # ALGO LOGIC: action logic
+                with torch.no_grad():
+                    action, _, _, _ = agent.get_action_and_value(obs[-1], masks[-1])
+                actions.append(action)
+
+                # TRY NOT TO MODIFY: execute the game and log data.
+                preferences = next_obs[:, 0].astype(np.float64)
+                env_start = time.perf_counter()
+                next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
+                env_seconds += time.perf_counter() - env_start
+                next_done = terminations | truncations
+                rewards.append(reward.astype(np.float64))
+                episode_returns += reward
+
+            if not next_done.all():
+                protocol.fail(f"--env-id {args.env_id}: EUPG needs episodes of one length, and one ended at step "
+                              f"{len(rewards)} before the others")
+            for i in range(args.num_envs):
+                episode += 1
+                carbon, thaw = episode_returns[i]
+                run.log("episodes", {
+                    "global_step": global_step, "episode": episode, "env": i, "preference": preferences[i],
+                    "carbon_return": carbon, "thaw_return": thaw,
+                    "scalarized_return": protocol.scalarize(carbon, thaw, preferences[i]),
+                    **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO)),
+                })
+                progress.returns.append((carbon, thaw))
+            run.time("environment", global_step, env_seconds)
+            run.time("rollout", global_step, time.perf_counter() - rollout_start)
+            update_start = time.perf_counter()
+
+            # Optimizing the policy: one step of gradient ascent
+            utilities = compute_utilities(np.stack(rewards), preferences, args.gamma, args.utility)
+            loss, entropy = eupg_loss(agent, torch.cat(obs), torch.cat(masks), torch.cat(actions),
+                                      torch.from_numpy(utilities.ravel().astype(np.float32)))
+            optimizer.zero_grad()
+            loss.backward()
+            gradient_norm = nn.utils.clip_grad_norm_(agent.parameters(), math.inf)  # measures, clips nothing
+            optimizer.step()
+
+            # TRY NOT TO MODIFY: record the update
+            run.log("updates", {
+                "iteration": iteration, "global_step": global_step, "policy_loss": loss.item(),
+                "entropy": entropy.item(), "gradient_norm": gradient_norm.item(),
+                "utility_mean": utilities.mean(), "utility_std": utilities.std(),
+            })
+            run.time("update", global_step, time.perf_counter() - update_start)
+
+            batch_steps = len(rewards) * args.num_envs
+            last = global_step + batch_steps > args.total_timesteps
+            progress.show(global_step, last)
+            state = {
+                "agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
+                "episode": episode, "next_obs": next_obs, "batch_steps": batch_steps,
+            }
+            run.save(global_step, last, **state)
+
+        envs.close()
+
+        def action_probabilities(observations, masks, accrued_returns):
+            with torch.no_grad():
+                distribution = agent.get_distribution(
+                    policy_input(observations, accrued_returns), torch.from_numpy(masks)
+                )
+            return distribution.probs.numpy()
+
+        evaluation_start = time.perf_counter()
+        evaluation, years = protocol.evaluate(args, env_kwargs, action_probabilities)
+        run.time("evaluation", global_step, time.perf_counter() - evaluation_start)
+        run.finish(evaluation, years)

@@ -1,0 +1,334 @@
+# Gated PPO: preference-conditioned PPO whose policy first chooses whether to plant, with a head for either case.
+# ppo_curriculum.py is this file and a curriculum. Its skeleton is that of CleanRL's ppo.py.
+import math
+import random
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+import torch.nn as nn
+import torch.optim as optim
+from torch.distributions.categorical import Categorical
+
+import boreal_env
+from analysis import protocol
+
+
+@dataclass
+class Args:
+    """Gated PPO on the boreal forest environments: trains, evaluates, and leaves a run folder."""
+
+    seed: int = 1
+    """seed of the run: agent, sampling and training episodes"""
+    env_id: str | None = None
+    """boreal-generalist-v0, -balanced-v0 or -site-specific-v0, or module:id of your own (None: the mode's)"""
+    mode: Literal["generalist", "site-specific"] | None = None
+    """a new site and weather in every episode, or one fixed site (None: the environment's)"""
+    site_seed: int | None = None
+    """another fixed site, in site-specific mode"""
+    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
+    """formula of the thaw reward"""
+    total_timesteps: int | None = None
+    """steps, summed over all environments (None: 300000, in site-specific mode 100000)"""
+    num_envs: int | None = None
+    """number of environments (None: 8 async, 32 lockstep)"""
+    vectorization: Literal["async", "lockstep"] = "async"
+    """one process per environment, or all environments in one compiled call"""
+
+    # Algorithm: the paper's hyperparameters; CleanRL's where the paper is silent
+    learning_rate: float = 3e-4
+    """learning rate of Adam"""
+    rollout_steps: int = 2048
+    """steps of a rollout, summed over all environments"""
+    gamma: float = 0.99
+    """discount factor"""
+    gae_lambda: float = 0.95
+    """lambda of generalised advantage estimation"""
+    minibatch_size: int = 64
+    """largest number of transitions in a minibatch"""
+    update_epochs: int = 10
+    """passes over the rollout in an update"""
+    norm_adv: bool = True
+    """normalise the advantages in each minibatch"""
+    clip_coef: float = 0.2
+    """clipping of the policy's probability ratio"""
+    clip_vloss: bool = False
+    """clip the value loss too (clip_coef is in units of return, of which a site has tens: learning slows)"""
+    ent_coef: float = 0.01
+    """weight of the entropy bonus"""
+    vf_coef: float = 0.5
+    """weight of the value loss"""
+    max_grad_norm: float = 0.5
+    """largest norm of the gradient"""
+
+    # Evaluation and output
+    eval_episodes: int = 100
+    """evaluation episodes per weight"""
+    eval_weights: tuple[float, ...] = protocol.EVAL_WEIGHTS
+    """carbon weights of the evaluation"""
+    run_dir: str | None = None
+    """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
+    overwrite: bool = False
+    """start over in a folder that already holds a run"""
+    track: tuple[Literal["tensorboard", "wandb"], ...] = ()
+    """follow the run's tables in TensorBoard (files in the run's folder) or Weights & Biases"""
+    wandb_project_name: str = "borearl"
+    """project of Weights & Biases"""
+
+
+def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
+    torch.nn.init.orthogonal_(layer.weight, std)
+    torch.nn.init.constant_(layer.bias, bias_const)
+    return layer
+
+
+class Agent(nn.Module):
+    """A gate chooses planting (actions 15-24) or not (0-14); each has its own head."""
+
+    def __init__(self, envs):
+        super().__init__()
+        observation_dim = np.array(envs.single_observation_space.shape).prod()
+        self.critic = nn.Sequential(
+            layer_init(nn.Linear(observation_dim, 64)),
+            nn.Tanh(),
+            layer_init(nn.Linear(64, 64)),
+            nn.Tanh(),
+            layer_init(nn.Linear(64, 1), std=1.0),
+        )
+        self.actor = nn.Sequential(
+            layer_init(nn.Linear(observation_dim, 64)),
+            nn.Tanh(),
+            layer_init(nn.Linear(64, 64)),
+            nn.Tanh(),
+        )
+        self.gate = layer_init(nn.Linear(64, 2), std=0.01)
+        self.other_head = layer_init(nn.Linear(64, 15), std=0.01)
+        self.plant_head = layer_init(nn.Linear(64, 10), std=0.01)
+
+    def get_value(self, x):
+        return self.critic(x)
+
+    def get_distribution(self, x, mask):
+        """x (n, observation), mask (n, 25) bool, at least one action valid in each row."""
+        hidden = self.actor(x)
+        other_mask, plant_mask = mask[:, :15], mask[:, 15:]
+        group_mask = torch.stack([other_mask.any(dim=1), plant_mask.any(dim=1)], dim=1)
+        # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in a group without a valid action
+        gate = torch.where(group_mask, self.gate(hidden), -1e8).log_softmax(dim=1)
+        other = torch.where(other_mask, self.other_head(hidden), -1e8).log_softmax(dim=1)
+        plant = torch.where(plant_mask, self.plant_head(hidden), -1e8).log_softmax(dim=1)
+        return Categorical(logits=torch.cat([gate[:, :1] + other, gate[:, 1:] + plant], dim=1))
+
+    def get_action_and_value(self, x, mask, action=None):
+        distribution = self.get_distribution(x, mask)
+        if action is None:
+            action = distribution.sample()
+        return action, distribution.log_prob(action), distribution.entropy(), self.critic(x)
+
+
+def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda):
+    """Advantages (steps, envs); dones[t] says that step t follows the end of an episode.
+
+    The end of an episode is terminal: nothing is worth anything beyond it, so nothing is bootstrapped.
+    """
+    advantages = torch.zeros_like(rewards)
+    lastgaelam = 0
+    for t in reversed(range(len(rewards))):
+        last = t == len(rewards) - 1
+        nextnonterminal = 1.0 - (next_done if last else dones[t + 1])
+        nextvalues = next_value if last else values[t + 1]
+        delta = rewards[t] + gamma * nextvalues * nextnonterminal - values[t]
+        advantages[t] = lastgaelam = delta + gamma * gae_lambda * nextnonterminal * lastgaelam
+    return advantages
+
+
+def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value, args):
+    """Policy loss, value loss, entropy, two estimates of the KL divergence and clip fraction of a minibatch."""
+    _, logprob, entropy, value = agent.get_action_and_value(x, mask, action)
+    value = value.view(-1)
+    logratio = logprob - old_logprob
+    ratio = logratio.exp()
+
+    # Policy loss
+    if args.norm_adv and len(advantage) > 1:
+        advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+    pg_loss1 = -advantage * ratio
+    pg_loss2 = -advantage * torch.clamp(ratio, 1 - args.clip_coef, 1 + args.clip_coef)
+    pg_loss = torch.max(pg_loss1, pg_loss2).mean()
+
+    # Value loss
+    v_loss = (value - target) ** 2
+    if args.clip_vloss:
+        v_clipped = old_value + torch.clamp(value - old_value, -args.clip_coef, args.clip_coef)
+        v_loss = torch.max(v_loss, (v_clipped - target) ** 2)
+    v_loss = 0.5 * v_loss.mean()
+
+    with torch.no_grad():
+        # http://joschu.net/blog/kl-approx.html
+        old_kl, kl = -logratio.mean(), (ratio - 1 - logratio).mean()
+        clipfrac = ((ratio - 1).abs() > args.clip_coef).float().mean()
+    return pg_loss, v_loss, entropy.mean(), old_kl, kl, clipfrac
+
+
+if __name__ == "__main__":
+    args = protocol.parse(Args)
+    env_kwargs = protocol.prepare(args)
+    episode_columns = protocol.EPISODE_COLUMNS
+    update_columns = ("iteration", "global_step", "policy_loss", "value_loss", "entropy", "old_approx_kl",
+                      "approx_kl", "clip_fraction", "explained_variance")
+
+    with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
+        # TRY NOT TO MODIFY: seeding
+        random.seed(args.seed)
+        np.random.seed(args.seed)
+        torch.manual_seed(args.seed)
+        torch.set_num_threads(1)
+
+        # env setup
+        if args.env_id in protocol.MODES:
+            print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
+            boreal_env.warm_up(args.num_envs if args.vectorization == "lockstep" else 1)  # before workers are forked
+        envs = run.make_envs(env_kwargs)
+
+        agent = Agent(envs)
+        optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+
+        # TRY NOT TO MODIFY: start the game
+        first_iteration, global_step, episode = 1, 0, 0
+        start_seed = args.seed * protocol.MAX_ENVS
+        next_obs, _ = envs.reset(seed=[start_seed + i for i in range(args.num_envs)])
+        next_done = np.zeros(args.num_envs, dtype=bool)
+        episode_returns = np.zeros((args.num_envs, 2))
+
+        # RESUME: all is as when the checkpoint was written
+        if state := run.resume():
+            agent.load_state_dict(state["agent"])
+            optimizer.load_state_dict(state["optimizer"])
+            first_iteration, global_step, episode = state["iteration"] + 1, state["global_step"], state["episode"]
+            next_obs, next_done, episode_returns = state["next_obs"], state["next_done"], state["episode_returns"]
+
+        # every environment makes the same number of steps, so num_envs may leave a few of the total over
+        steps_per_env = args.total_timesteps // args.num_envs
+        rollout_length = args.rollout_steps // args.num_envs
+        num_iterations = math.ceil(steps_per_env / rollout_length)
+        progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps", global_step)
+
+        for iteration in range(first_iteration, num_iterations + 1):
+            # ALGO Logic: Storage setup (the last rollout may be shorter)
+            num_steps = min(rollout_length, steps_per_env - global_step // args.num_envs)
+            obs = torch.zeros((num_steps, args.num_envs) + envs.single_observation_space.shape)
+            masks = torch.zeros((num_steps, args.num_envs, 25), dtype=torch.bool)
+            actions = torch.zeros((num_steps, args.num_envs), dtype=torch.long)
+            logprobs = torch.zeros((num_steps, args.num_envs))
+            rewards = torch.zeros((num_steps, args.num_envs))
+            dones = torch.zeros((num_steps, args.num_envs))
+            values = torch.zeros((num_steps, args.num_envs))
+            rollout_start, env_seconds = time.perf_counter(), 0.0
+
+            for step in range(num_steps):
+                global_step += args.num_envs
+                obs[step] = torch.from_numpy(next_obs)
+                masks[step] = torch.from_numpy(protocol.action_masks(envs, next_obs, args.env_id))
+                dones[step] = torch.from_numpy(next_done)
+
+                # ALGO LOGIC: action logic
+                with torch.no_grad():
+                    action, logprob, _, value = agent.get_action_and_value(obs[step], masks[step])
+                    values[step] = value.flatten()
+                actions[step] = action
+                logprobs[step] = logprob
+
+                # TRY NOT TO MODIFY: execute the game and log data.
+                preferences = next_obs[:, 0].astype(np.float64)
+                env_start = time.perf_counter()
+                next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
+                env_seconds += time.perf_counter() - env_start
+                next_done = terminations | truncations
+                episode_returns += reward
+                scalarized = protocol.scalarize(reward[:, 0], reward[:, 1], preferences)
+                rewards[step] = torch.from_numpy(scalarized)
+
+                for i in np.flatnonzero(next_done):
+                    episode += 1
+                    carbon, thaw = episode_returns[i]
+                    scalarized_return = protocol.scalarize(carbon, thaw, preferences[i])
+                    row = {"global_step": global_step, "episode": episode, "env": i, "preference": preferences[i],
+                           "carbon_return": carbon, "thaw_return": thaw, "scalarized_return": scalarized_return,
+                           **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO))}
+
+                    run.log("episodes", row)
+                    progress.returns.append((carbon, thaw))
+                    episode_returns[i] = 0
+                progress.show(global_step)
+            run.time("environment", global_step, env_seconds)
+            run.time("rollout", global_step, time.perf_counter() - rollout_start)
+            update_start = time.perf_counter()
+
+            # advantages, and bootstrap values of the episodes that the rollout cuts
+            with torch.no_grad():
+                next_value = agent.get_value(torch.from_numpy(next_obs)).flatten()
+            last_done = torch.from_numpy(next_done).float()
+            advantages = compute_gae(rewards, values, dones, next_value, last_done, args.gamma, args.gae_lambda)
+            returns = advantages + values
+
+            # flatten the batch
+            b_obs = obs.flatten(0, 1)
+            b_masks = masks.flatten(0, 1)
+            b_logprobs = logprobs.flatten()
+            b_actions = actions.flatten()
+            b_advantages = advantages.flatten()
+            b_returns = returns.flatten()
+            b_values = values.flatten()
+            b_inds = np.arange(num_steps * args.num_envs)
+
+            # Optimizing the policy and value network
+            num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
+            losses = []
+            y_pred, y_true = b_values[b_inds], b_returns[b_inds]
+            for epoch in range(args.update_epochs):
+                np.random.shuffle(b_inds)
+                for minibatch in range(num_minibatches):
+                    mb_inds = b_inds[minibatch::num_minibatches]
+                    parts = ppo_losses(
+                        agent, b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds], b_logprobs[mb_inds],
+                        b_advantages[mb_inds], b_returns[mb_inds], b_values[mb_inds], args
+                    )
+                    pg_loss, v_loss, entropy = parts[:3]
+                    loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
+
+                    optimizer.zero_grad()
+                    loss.backward()
+                    nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
+                    optimizer.step()
+                    losses.append(torch.stack(parts).detach().numpy())
+
+            # TRY NOT TO MODIFY: record the update; means over its minibatches
+            row = {"iteration": iteration, "global_step": global_step}
+            if losses:
+                row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0), strict=True))
+                row["explained_variance"] = (1 - (y_true - y_pred).var() / y_true.var()).item()
+
+            run.log("updates", row)
+            run.time("update", global_step, time.perf_counter() - update_start)
+
+            state = {
+                "agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
+                "episode": episode, "next_obs": next_obs, "next_done": next_done, "episode_returns": episode_returns,
+            }
+
+            run.save(global_step, last=iteration == num_iterations, **state)
+
+        envs.close()
+
+        def action_probabilities(observations, masks, accrued_returns):
+            with torch.no_grad():
+                distribution = agent.get_distribution(torch.from_numpy(observations), torch.from_numpy(masks))
+            return distribution.probs.numpy()
+
+        evaluation_start = time.perf_counter()
+        evaluation, years = protocol.evaluate(args, env_kwargs, action_probabilities)
+        run.time("evaluation", global_step, time.perf_counter() - evaluation_start)
+        run.finish(evaluation, years)

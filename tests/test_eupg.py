@@ -1,0 +1,132 @@
+from types import SimpleNamespace
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from scripts import ROOT, run_script
+from toy_env import optimal_return
+
+from analysis import protocol
+from cleanrl_style import eupg_fixed_lambda, eupg_var_lambda
+from cleanrl_style.eupg_var_lambda import Agent, compute_utilities, eupg_loss, policy_input
+
+STEPS, SIZE = 6, 5
+
+
+def make_agent():
+    torch.manual_seed(0)
+    agent = Agent(SimpleNamespace(single_observation_space=gym.spaces.Box(0, 1, (SIZE,)))).double()
+    with torch.no_grad():
+        agent.actor[-1].weight *= 100  # far from uniform
+    return agent
+
+
+@pytest.fixture
+def episode():
+    """A recorded episode of one environment: x, masks, actions, rewards (steps, 2), preference."""
+    generator = np.random.default_rng(3)
+    rewards, preference = generator.normal(size=(STEPS, 2)), 0.3
+    accrued = np.vstack([np.zeros(2), np.cumsum(rewards, axis=0)[:-1]])
+    masks = generator.random((STEPS, 25)) < 0.6
+    masks[:, 12] = True
+    actions = np.array([generator.choice(np.flatnonzero(mask)) for mask in masks])
+    return np.hstack([generator.random((STEPS, SIZE)), accrued / 50]), masks, actions, rewards, preference
+
+
+def numpy_gradient(agent, x, masks, actions, utilities):
+    """Gradient of -mean_t utility_t log pi(a_t | x_t) in every parameter, by hand."""
+    parameters = {name: value.detach().numpy() for name, value in agent.named_parameters()}
+    (w1, b1, w2, b2, w3, b3), n = parameters.values(), len(x)
+    h1 = np.tanh(x @ w1.T + b1)
+    h2 = np.tanh(h1 @ w2.T + b2)
+    odds = np.exp(h2 @ w3.T + b3) * masks
+    probabilities = odds / odds.sum(axis=1, keepdims=True)
+    # d log pi(a) / d logit_k = [k = a] - pi(k)
+    d3 = (probabilities - np.eye(25)[actions]) * utilities[:, None] / n
+    d2 = (d3 @ w3) * (1 - h2**2)
+    d1 = (d2 @ w2) * (1 - h1**2)
+    return [d1.T @ x, d1.sum(0), d2.T @ h1, d2.sum(0), d3.T @ h2, d3.sum(0)]
+
+
+@pytest.mark.parametrize("which", ["total", "future"])
+@pytest.mark.parametrize("gamma", [1.0, 0.9])
+def test_gradient_is_that_of_a_numpy_implementation(episode, which, gamma):
+    x, masks, actions, rewards, preference = episode
+    scalarized = preference * rewards[:, 0] + (1 - preference) * rewards[:, 1]
+    discounts = gamma ** np.arange(STEPS)
+    if which == "total":
+        expected = np.full(STEPS, (discounts * scalarized).sum())
+    else:
+        expected = np.array([(discounts[: STEPS - t] * scalarized[t:]).sum() for t in range(STEPS)])
+    utilities = compute_utilities(rewards[:, None], np.array([preference]), gamma, which)[:, 0]
+    np.testing.assert_allclose(utilities, expected, rtol=1e-12)
+
+    agent = make_agent()
+    loss, _ = eupg_loss(agent, torch.tensor(x), torch.tensor(masks), torch.tensor(actions), torch.tensor(utilities))
+    loss.backward()
+    for parameter, gradient in zip(agent.parameters(), numpy_gradient(agent, x, masks, actions, expected), strict=True):
+        np.testing.assert_allclose(parameter.grad.numpy(), gradient, rtol=1e-9, atol=1e-12)
+
+
+def test_masked_actions_have_no_probability_and_the_others_all_of_it(episode):
+    x, masks, *_ = episode
+    probabilities = make_agent().get_distribution(torch.tensor(x), torch.tensor(masks)).probs.detach().numpy()
+    assert (probabilities[~masks] == 0).all() and (probabilities[masks] > 0).all()
+    np.testing.assert_allclose(probabilities.sum(axis=1), 1)
+
+
+def test_evaluation_gives_the_policy_what_training_gives_it():
+    """One episode under the protocol and by the lines of the training loop: the same x at every step."""
+    evaluated = []
+    args = eupg_var_lambda.Args(env_id="toy_env:toy-v0", eval_episodes=1, eval_weights=(0.25,))
+    env_kwargs = protocol.prepare(args)
+    actions = np.random.default_rng(0).integers(25, size=10)
+
+    def policy(observations, masks, accrued_returns):
+        evaluated.append(policy_input(observations, accrued_returns))
+        return np.eye(25)[[actions[len(evaluated) - 1]]]
+
+    protocol.evaluate(args, env_kwargs, policy, policies=("greedy",))
+    # the training loop's own lines, on the same episode
+    env = gym.make("toy_env:toy-v0", disable_env_checker=True)
+    next_obs, _ = env.reset(seed=protocol.FIRST_EVALUATION_SEED, options={"preference": 0.25})
+    episode_returns = np.zeros((1, 2))
+    for action, x in zip(actions, evaluated, strict=True):
+        torch.testing.assert_close(policy_input(next_obs[None], episode_returns), x, rtol=0, atol=0)
+        next_obs, reward, *_ = env.step(action)
+        episode_returns += reward
+    assert evaluated[-1][0, -2:].abs().sum() > 0.1
+
+
+def learn(script, folder, *arguments):
+    """Return of the greedy policy per weight, as the toy gives it that is not centred."""
+    run_script(f"cleanrl_style/{script}.py", "--env-id", "toy_env:toy-centred-v0", "--run-dir", folder, "--num-envs",
+               8, "--eval-episodes", 10, *arguments)
+    evaluation = pd.read_csv(folder / "evaluation.csv")
+    return evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean() + 6
+
+
+@pytest.mark.parametrize("utility", ["total", "future"])
+def test_fixed_lambda_learns_the_toy(tmp_path, utility):
+    returns = learn("eupg_fixed_lambda", tmp_path, "--preference", 1, "--utility", utility, "--learning-rate", 0.005,
+                    "--total-timesteps", 16_000)
+    assert returns.index.tolist() == [1.0]
+    assert returns[1.0] > 0.95 * optimal_return(1)
+    assert (pd.read_csv(tmp_path / "episodes.csv").preference == 1).all()
+
+
+def test_variable_lambda_learns_to_follow_the_preference(tmp_path):
+    returns = learn("eupg_var_lambda", tmp_path, "--utility", "future", "--learning-rate", 0.003, "--total-timesteps",
+                    30_000, "--eval-weights", 0, 1)
+    # a policy blind to the preference has no mix m with both 10 (1 - m^2) and 10 m above 8
+    assert returns[0.0] > 8 and returns[1.0] > 8
+    assert pd.read_csv(tmp_path / "episodes.csv").preference.nunique() > 1000
+
+
+def test_the_scripts_differ_in_the_preference_and_nothing_else():
+    fixed, variable = ((ROOT / "cleanrl_style" / f"eupg_{name}_lambda.py").read_text() for name in ("fixed", "var"))
+    assert fixed.split("class Agent")[1] == variable.split("class Agent")[1]
+    fields = [set(script.Args.__dataclass_fields__) for script in (eupg_fixed_lambda, eupg_var_lambda)]
+    assert fields[0] ^ fields[1] == {"preference", "eval_weights"}

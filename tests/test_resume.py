@@ -1,0 +1,220 @@
+"""A run that is stopped, by whatever, and started again by the same command."""
+
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from scripts import ROOT, run_script
+
+TOY = ("--env-id", "resumable_toy:resumable-toy-v0", "--total-timesteps", 6000, "--num-envs", 3, "--eval-episodes", 2)
+BOREAL = ("--total-timesteps", 2800, "--num-envs", 4, "--eval-episodes", 1, "--vectorization", "lockstep")
+
+
+def arguments(script, common):
+    ppo = ("--rollout-steps", 600 if common is TOY else 400, "--update-epochs", 2) if "ppo" in script else ()
+    weights = ("--eval-weights", 0, 1) if script != "eupg_fixed_lambda" else ()
+    return (*common, *ppo, *weights)
+
+
+def start(script, folder, *arguments, **environment):
+    """The script in a process group of its own, as from a terminal."""
+    path = os.pathsep.join([str(ROOT), str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")])
+    command = [sys.executable, ROOT / "cleanrl_style" / f"{script}.py", "--run-dir", folder, *arguments]
+    limit = environment.pop("file_size", None)
+    return subprocess.Popen(
+        [str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": path, **environment}, start_new_session=True,
+        preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))))
+
+
+def finish(process, timeout=120):
+    """Exit code, standard output and error of a process that ends by itself, and leaves none behind."""
+    out, err = process.communicate(timeout=timeout)
+    for _ in range(50):
+        if not members(process.pid):
+            return process.returncode, out, err
+        time.sleep(0.1)
+    pytest.fail(f"processes {members(process.pid)} outlive the script")
+
+
+def members(group):
+    """Processes of a group that still run."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[2]) == group and fields[0] != "Z":
+            found.append(int(path.parent.name))
+    return found
+
+
+def children(process):
+    """The worker processes."""
+    return sorted(pid for pid in members(process.pid) if pid != process.pid)
+
+
+def wait_for_rows(process, folder, rows, table="updates.csv"):
+    """Wait until a table has that many rows."""
+    while process.poll() is None:
+        if (folder / table).exists() and (folder / table).read_bytes().count(b"\n") > rows:
+            return
+        time.sleep(0.005)
+    pytest.fail(f"ended before its {rows} rows: {process.communicate()}")
+
+
+def assert_same_bytes(folder, other):
+    """Every file but timing.csv."""
+    names = {path.name for path in folder.iterdir()}
+    assert names == {path.name for path in other.iterdir()}
+    for name in names - {"timing.csv"}:
+        assert (folder / name).read_bytes() == (other / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("script, common", [
+    ("ppo_curriculum", TOY), ("ppo_gated", TOY), ("eupg_var_lambda", BOREAL), ("eupg_fixed_lambda", TOY),
+], ids=["ppo_curriculum-async", "ppo_gated-async", "eupg_var_lambda-lockstep", "eupg_fixed_lambda-async"])
+def test_killed_and_resumed_is_as_never_killed(script, common, tmp_path):
+    given, killed = arguments(script, common), tmp_path / "killed"
+    process = start(script, killed, *given)
+    dice = random.Random(script)
+    wait_for_rows(process, killed, 1)
+    while process.poll() is None and not (killed / "checkpoint.pt").exists():
+        time.sleep(0.005)
+    time.sleep(0.3 * dice.random())
+    os.kill(process.pid, signal.SIGKILL)
+    finish(process)
+    assert not (killed / "evaluation.csv").exists()
+    timing = (killed / "timing.csv").read_bytes()
+    resumed = start(script, killed, *given)
+    run_script(f"cleanrl_style/{script}.py", "--run-dir", tmp_path / "whole", *given)
+    code, out, err = finish(resumed)
+    assert code == 0 and "resuming at step" in out, err
+    assert_same_bytes(tmp_path / "whole", killed)
+    assert (killed / "timing.csv").read_bytes().startswith(timing)
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory):
+    """A run that Ctrl-C stopped, and what it said."""
+    folder = tmp_path_factory.mktemp("runs") / "interrupted"
+    process = start("ppo_gated", folder, *arguments("ppo_gated", TOY))
+    while process.poll() is None and not (folder / "checkpoint.pt").exists():
+        time.sleep(0.005)
+    os.killpg(process.pid, signal.SIGINT)
+    return folder, *finish(process)
+
+
+def test_ctrl_c_says_how_to_go_on(interrupted):
+    folder, code, _, err = interrupted
+    assert code == 130
+    assert err.strip().splitlines() == [f"{folder}: interrupted; the same command goes on from step 2,400"]
+    assert (folder / "checkpoint.pt").exists() and not (folder / "evaluation.csv").exists()
+
+
+def test_sigterm_is_as_ctrl_c(tmp_path):
+    process = start("eupg_var_lambda", tmp_path / "run", *arguments("eupg_var_lambda", TOY), TOY_SECONDS="0.01")
+    wait_for_rows(process, tmp_path / "run", 1)
+    process.terminate()
+    code, _, err = finish(process)
+    assert code == 130
+    assert err.strip() == f"{tmp_path / 'run'}: interrupted; the same command starts it again"
+
+
+def copy(interrupted, tmp_path):
+    """A copy of the interrupted run, to be harmed."""
+    return shutil.copytree(interrupted[0], tmp_path / "copy")
+
+
+def resume(folder):
+    """Run on in this process."""
+    run_script("cleanrl_style/ppo_gated.py", "--run-dir", folder, *arguments("ppo_gated", TOY))
+
+
+@pytest.mark.parametrize("harm", [
+    lambda data: b"",
+    lambda data: data[:1000],
+    lambda data: data[: len(data) // 2] + bytes([data[len(data) // 2] ^ 1]) + data[len(data) // 2 + 1:],
+], ids=["empty", "cut", "one bit"])
+def test_a_damaged_checkpoint_is_refused(interrupted, tmp_path, harm):
+    folder = copy(interrupted, tmp_path)
+    checkpoint = folder / "checkpoint.pt"
+    checkpoint.write_bytes(harm(checkpoint.read_bytes()))
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(SystemExit, match="^error: .*checkpoint.pt is damaged.*--overwrite starts over"):
+        resume(folder)
+    assert before == {path: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_a_table_shorter_than_its_checkpoint_is_refused(interrupted, tmp_path):
+    folder = copy(interrupted, tmp_path)
+    (folder / "episodes.csv").write_bytes((folder / "episodes.csv").read_bytes()[:200])
+    with pytest.raises(SystemExit, match="episodes.csv is shorter than when the checkpoint was written"):
+        resume(folder)
+
+
+def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, tmp_path):
+    folder = copy(interrupted, tmp_path)
+    config = json.loads((folder / "config.json").read_text())
+    config["versions"]["numpy"] = "1.0"
+    (folder / "config.json").write_text(json.dumps(config))
+    first = start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_SECONDS="0.01")
+    wait_for_rows(first, folder, 5)
+    with pytest.raises(SystemExit, match="another process is at work on this run"):
+        resume(folder)
+    os.killpg(first.pid, signal.SIGINT)
+    code, out, err = finish(first)
+    assert code == 130 and "resuming at step 2,400" in out
+    assert "was begun with numpy 1.0 there" in err and "Traceback" not in err
+
+
+def test_a_full_disk_leaves_the_old_checkpoint(interrupted, tmp_path):
+    folder = copy(interrupted, tmp_path)
+    old = (folder / "checkpoint.pt").read_bytes()
+    code, out, err = finish(start("ppo_gated", folder, *arguments("ppo_gated", TOY), file_size=len(old) // 2))
+    assert code == 1 and "Traceback" not in err
+    assert err.strip() == f"error: --run-dir {folder}: cannot write there (File too large)"
+    assert (folder / "checkpoint.pt").read_bytes() == old
+    assert not list(folder.glob("*.tmp"))
+
+
+def test_an_error_in_a_worker_is_shown_and_ends_the_run(interrupted, tmp_path):
+    folder = copy(interrupted, tmp_path)
+    old = (folder / "checkpoint.pt").read_bytes()
+    code, _, err = finish(start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_ERROR_AT="20"))
+    assert code == 1
+    assert "FloatingPointError: the ground is 100% gone" in err and "error in environment 0" in err
+    last = err.strip().splitlines()[-1]
+    assert last.startswith("error: environment 0 was ended by its error above")
+    assert last.endswith("the same command goes on from step 2,400")
+    assert (folder / "checkpoint.pt").read_bytes() == old
+
+
+def test_a_killed_worker_ends_the_run(interrupted, tmp_path):
+    folder = copy(interrupted, tmp_path)
+    process = start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_SECONDS="0.01")
+    wait_for_rows(process, folder, 5)
+    os.kill(children(process)[1], signal.SIGKILL)
+    code, _, err = finish(process)
+    assert code == 1
+    assert err.strip() == "error: environment 1 was ended by signal 9; the same command goes on from step 2,400"
+
+
+def test_an_environment_without_a_state_starts_over(tmp_path, capsys):
+    command = ("cleanrl_style/eupg_var_lambda.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path, "--num-envs",
+               2, "--total-timesteps", 40, "--eval-episodes", 1, "--eval-weights", 0, 1)
+    run_script(*command)
+    whole = {path: path.read_bytes() for path in tmp_path.iterdir() if path.name != "timing.csv"}
+    (tmp_path / "evaluation.csv").unlink()
+    run_script(*command)
+    assert "has no get_state(): the interrupted run starts over" in capsys.readouterr().out
+    assert whole == {path: path.read_bytes() for path in tmp_path.iterdir() if path.name != "timing.csv"}
