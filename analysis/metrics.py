@@ -130,6 +130,16 @@ def significant_violations_percent(evaluation: pd.DataFrame) -> float:
     return 100 * float(_violates(change, half_width).mean())
 
 
+def expected_violations_percent(returns: np.ndarray, repetitions: int = 2000) -> float:
+    """What `violations_percent` is on average if the points come in a random order [%]: of a policy that ignores
+    the preference and differs between weights by chance alone. Deterministic.
+    """
+    returns = np.asarray(returns, dtype=float)
+    generator = np.random.default_rng(0)
+    orders = np.stack([generator.permutation(len(returns)) for _ in range(repetitions)])
+    return 100 * float(_violates(np.diff(returns[orders], axis=1)).mean()) if len(returns) > 1 else np.nan
+
+
 def preference_response(evaluation: pd.DataFrame) -> pd.DataFrame:
     """How both returns follow the preference, over the paired episodes, with 95 % intervals.
 
