@@ -177,3 +177,17 @@ def bootstrap_interval(values: np.ndarray, repetitions: int = 50_000) -> tuple[f
     resampled = np.random.default_rng(0).choice(values, (repetitions, len(values)))
     low, high = np.percentile(stats.trim_mean(resampled, 0.25, axis=1), [2.5, 97.5])
     return float(low), float(high)
+
+
+def bootstrap_band(curves: np.ndarray, repetitions: int = 2000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """IQM of curves (seeds, points) over the seeds, and its 95 % percentile bootstrap interval at each point.
+
+    Whole curves are resampled; the interval is NaN for fewer than two seeds. Deterministic.
+    """
+    curves = np.asarray(curves, dtype=float)
+    middle = stats.trim_mean(curves, 0.25, axis=0)
+    if len(curves) < 2:
+        return middle, np.full_like(middle, np.nan), np.full_like(middle, np.nan)
+    chosen = np.random.default_rng(0).integers(len(curves), size=(repetitions, len(curves)))
+    low, high = np.percentile(stats.trim_mean(curves[chosen], 0.25, axis=1), [2.5, 97.5], axis=0)
+    return middle, low, high

@@ -44,6 +44,10 @@ class Replicate:
     evaluation: pd.DataFrame
     gains: pd.DataFrame | None  # the evaluation less zero change on the same episodes, if that was evaluated
 
+    def each_run(self) -> list["Replicate"]:
+        """Its runs, each a replicate of its own."""
+        return [Replicate([run], run.evaluation, None) for run in self.runs]
+
     def years(self, variables: list[str] | None = None) -> pd.DataFrame:
         """Annual record of the sampled policy: means over the episodes, of the weights that are kept."""
         table = pd.concat([run.years for run in self.runs if run.years is not None], ignore_index=True)
@@ -120,9 +124,9 @@ class Results:
         """Whether a row is one of the paper's: no control, and not of the balanced environment."""
         return key[2] == "default" or any(job.row == key for job in self.jobs if job.experiment in ("main", "fixed"))
 
-    def command(self, experiment: str, script: str) -> str:
-        """The first command that makes a run of an experiment's script."""
-        return next(job.command for job in self.jobs if job.experiment == experiment and job.script == script)
+    def first_job(self, experiment: str, script: str) -> experiments.Job:
+        """The first job of an experiment's script."""
+        return next(job for job in self.jobs if job.experiment == experiment and job.script == script)
 
     def study(self, name: str) -> pd.DataFrame | None:
         """The table of a study; None if it has not been made."""

@@ -63,7 +63,8 @@ def main(args: Args) -> None:
     found = results.Results.load(args.quick)
     curricula = found.of("main", "ppo_curriculum")
     if not curricula:
-        sys.exit(f"error: no finished run of the curriculum; {found.command('main', 'ppo_curriculum')} makes the first")
+        command = found.first_job("main", "ppo_curriculum").command
+        sys.exit(f"error: no finished run of the curriculum; {command} makes the first")
     each, years = (2, 5) if args.quick else (EACH, YEARS)
     path = found.studies_dir / "site_warming.csv"
     seeds = [curriculum.runs[0].arguments["seed"] for curriculum in curricula]

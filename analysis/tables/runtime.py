@@ -22,9 +22,9 @@ PHASES = ("rollout", "update", "evaluation")
 def hours(run) -> dict:
     """Hours of a run by phase; `training` is rollouts and updates."""
     by_phase = run.timing.groupby("phase").seconds.sum().reindex([*PHASES, "environment"]) / 3600
-    training = by_phase.rollout + by_phase.update
-    return {"training": training, "evaluation": by_phase.evaluation,
-            "environment": 100 * by_phase.environment / training}  # fmt: skip
+    training = by_phase["rollout"] + by_phase["update"]
+    return {"training": training, "evaluation": by_phase["evaluation"],
+            "environment": 100 * by_phase["environment"] / training}  # fmt: skip
 
 
 def published(name: str) -> str:
