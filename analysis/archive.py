@@ -18,7 +18,6 @@ import pandas as pd
 from analysis import protocol, runs
 
 MOST_EPISODES = 6000
-KEPT_WEIGHTS = (0.0, 0.5, 1.0)
 FLOAT_FORMAT = "%.6g"
 # The evaluation is written last: it declares the run finished.
 TABLES = ("episodes", "updates", "timing", "evaluation_years", "evaluation_asymmetric", "evaluation")
@@ -39,7 +38,7 @@ def thin(name: str, table: pd.DataFrame) -> pd.DataFrame:
     if name == "episodes":
         return table.iloc[:: -(-len(table) // MOST_EPISODES) or 1]
     if name == "evaluation_years":
-        return table[(table.policy == "sampled") & table.preference.isin(KEPT_WEIGHTS)]
+        return table[(table.policy == "sampled") & table.preference.isin(runs.KEPT_WEIGHTS)]
     return table
 
 
@@ -52,10 +51,12 @@ def write_compressed(path: Path, table: pd.DataFrame) -> None:
 
 def folder_of(config: dict, archive_dir: Path) -> Path:
     """Where a run is archived: as `runs/` has it by default, wherever the run itself lies."""
-    arguments = config["arguments"]
-    changed = [(name, tuple(value) if isinstance(value, list) else value)
-               for name, value in config["not_default"].items()]  # fmt: skip
-    name = "-".join([arguments["env_id"].split(":")[-1].replace("/", "-"), *map(protocol.describe, changed)])
+    def text(value):
+        return ",".join(f"{v:g}" for v in value) if isinstance(value, list) else value
+
+    arguments, changed = config["arguments"], config["not_default"]
+    name = "-".join([arguments["env_id"].split(":")[-1].replace("/", "-"),
+                     *(f"{name}={text(value)}" for name, value in changed.items())])  # fmt: skip
     return archive_dir / config["script"] / name / f"seed{arguments['seed']}"
 
 

@@ -7,7 +7,7 @@ from analysis.evaluation import MODES
 from analysis.runs import setting
 
 ROOT = Path(__file__).parents[1]
-HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_policy")
+HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 METHODS = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum")  # conditioned on the preference
 TRAINED = (*METHODS, "eupg_fixed_lambda")
 STUDIES = ("constant_plans", "mechanism_pairs", "site_warming")
@@ -200,7 +200,7 @@ def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path = QUICK_DIR) -> list[Job]
             flags["total_timesteps"] = QUICK_STEPS * job.steps // default
         flags |= QUICK_EVALUATION
         if "preference" in flags:
-            flags["eval_weights"] = (flags["preference"],)
+            del flags["eval_weights"]  # an agent of one weight is evaluated at it
         flags["run_dir"] = runs_dir / f"{number:02d}-{job.script}"
         small.append(Job(job.experiment, job.script, flags))
     return small

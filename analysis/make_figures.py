@@ -38,7 +38,7 @@ class Args:
     """Draws the figures from the runs that exist."""
 
     runs_dir: tuple[Path, ...] | None = None
-    """folders that hold the runs, at any depth (None: runs and results/runs)"""
+    """folders that hold the runs, at any depth (None: results/runs and runs)"""
     figures_dir: Path | None = None
     """folder for the figures (None: results/figures, or results/quick/figures)"""
     quick: bool = False

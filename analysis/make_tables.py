@@ -36,7 +36,7 @@ class Args:
     """Makes the tables from the runs that exist."""
 
     runs_dir: tuple[Path, ...] | None = None
-    """folders that hold the runs, at any depth (None: runs and results/runs)"""
+    """folders that hold the runs, at any depth (None: results/runs and runs)"""
     tables_dir: Path | None = None
     """folder for the tables (None: results/tables, or results/quick/tables)"""
     quick: bool = False

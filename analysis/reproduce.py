@@ -125,11 +125,12 @@ def run_jobs(jobs: list, log_dir: Path, cores: list[int], finished, poll=POLL_SE
                 running.remove(one)
                 if one.process.returncode:
                     failed.append(one.job)
+                    all_steps -= one.job.steps
                     last = "\n    ".join(one.tail().splitlines()[-LAST_LINES:])
                     print(f"FAILED: {one.job.command}\n    {last}\n    (all of it: {one.log})", flush=True)
                 else:
                     done += 1
-                steps += one.job.steps
+                    steps += one.job.steps
             if time.monotonic() - reported >= REPORT_SECONDS or not (waiting or running):
                 reported = time.monotonic()
                 under_way = sum(one.steps() for one in running)

@@ -21,7 +21,7 @@ METHODS = {
     "conifer_restoration": "conifer_restoration",
     "zero_change": "zero_density_change",
     "plus_100": "plus_100_density",
-    "random_policy": None,
+    "random_valid": None,
 }
 TITLES = {
     "ppo_curriculum": "Curriculum PPO",
@@ -32,7 +32,7 @@ TITLES = {
     "conifer_restoration": "Conifer restoration",
     "zero_change": "Zero change",
     "plus_100": "+100 a year",
-    "random_policy": "Random",
+    "random_valid": "Random",
 }
 
 
@@ -68,11 +68,14 @@ class Results:
 
     @staticmethod
     def load(quick: bool, roots: tuple[Path, ...] | None = None) -> "Results":
-        """The results of `reproduce.py`, or of `reproduce.py --quick`."""
+        """The results of `reproduce.py`, or of `reproduce.py --quick`.
+
+        The archive comes before the runs themselves, so that a clone's tables have the same digits.
+        """
         if quick:
-            default = experiments.QUICK_DIR, experiments.QUICK_ARCHIVE_DIR
+            default = experiments.QUICK_ARCHIVE_DIR, experiments.QUICK_DIR
             return Results(roots or default, experiments.quick_jobs(), QUICK_STUDIES_DIR)
-        return Results(roots or (runs.RUNS_DIR, runs.ARCHIVE_DIR), experiments.jobs(), STUDIES_DIR)
+        return Results(roots or (runs.ARCHIVE_DIR, runs.RUNS_DIR), experiments.jobs(), STUDIES_DIR)
 
     @cached_property
     def rows(self) -> dict[tuple, list[Replicate]]:

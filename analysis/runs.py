@@ -6,17 +6,19 @@ A run is recognised by its config.json, never by the name of its folder, and is 
 import json
 import zlib
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.evaluation import EVALUATION_COLUMNS
+from analysis.evaluation import EVALUATION_COLUMNS, MODES
 
 RUNS_DIR, ARCHIVE_DIR = Path("runs"), Path("results/runs")
 QUICK = "quick"  # folder of runs/ with the runs of `reproduce.py --quick`, which are no results
+
+# Weights whose annual record tables and figures read; the archive has no other.
+KEPT_WEIGHTS = (0.0, 0.5, 1.0)
 
 # Arguments that do not make another row: what tells its runs apart, what the row has a column for, and the output.
 NOT_A_SETTING = ("seed", "site_seed", "preference", "eval_weights", "mode", "env_id", "run_dir", "overwrite")
@@ -24,11 +26,15 @@ NOT_A_SETTING = ("seed", "site_seed", "preference", "eval_weights", "mode", "env
 
 @dataclass(frozen=True)
 class Run:
-    """A finished run: its configuration and the evaluation of its sampled policy."""
+    """A finished run: its configuration, the evaluation of its sampled policy, and its other tables."""
 
     folder: Path
     config: dict
     evaluation: pd.DataFrame
+    episodes: pd.DataFrame | None  # of the training; None for a fixed strategy
+    timing: pd.DataFrame  # seconds by phase
+    years: pd.DataFrame | None  # annual record of the sampled policy at KEPT_WEIGHTS: statistics over the episodes
+    asymmetric_evaluation: pd.DataFrame | None  # under the asymmetric reward, if trained on another formulation
 
     @property
     def script(self) -> str:
@@ -44,33 +50,6 @@ class Run:
     def setting(self) -> str:
         """What is not default in the run, but for what tells replicates apart: runs that agree in it are one row."""
         return setting(self.config["not_default"])
-
-    @cached_property
-    def episodes(self) -> pd.DataFrame | None:
-        """Training episodes; None for a fixed strategy."""
-        return read_table(self.folder, "episodes")
-
-    @cached_property
-    def updates(self) -> pd.DataFrame | None:
-        """Updates of the policy; None for a fixed strategy."""
-        return read_table(self.folder, "updates")
-
-    @cached_property
-    def timing(self) -> pd.DataFrame | None:
-        """Seconds by phase."""
-        return read_table(self.folder, "timing")
-
-    @cached_property
-    def years(self) -> pd.DataFrame | None:
-        """Annual record of the sampled policy: preference, year, variable and its statistics over the episodes."""
-        years = read_table(self.folder, "evaluation_years")
-        return None if years is None else years[years.policy == "sampled"]
-
-    @cached_property
-    def asymmetric_evaluation(self) -> pd.DataFrame | None:
-        """Evaluation under the asymmetric reward, of a run trained on another formulation."""
-        table = read_table(self.folder, "evaluation_asymmetric")
-        return None if table is None else table[table.policy == "sampled"]
 
 
 def setting(not_default: dict) -> str:
@@ -132,7 +111,23 @@ def read_run(folder: Path) -> Run:
                          f"not {expected}")  # fmt: skip
     if not np.isfinite(evaluation[metrics.OBJECTIVES].to_numpy(dtype=float)).all():
         raise ValueError("damaged: evaluation.csv has returns that are not finite numbers")
-    return Run(folder, config, evaluation)
+    episodes = required_table(folder, "episodes") if "total_timesteps" in arguments else None
+    timing = required_table(folder, "timing")
+    years = required_table(folder, "evaluation_years") if arguments["env_id"] in MODES else None
+    if years is not None:
+        years = years[(years.policy == "sampled") & years.preference.isin(KEPT_WEIGHTS)]
+    asymmetric = read_table(folder, "evaluation_asymmetric")
+    if asymmetric is not None:
+        asymmetric = asymmetric[asymmetric.policy == "sampled"]
+    return Run(folder, config, evaluation, episodes, timing, years, asymmetric)
+
+
+def required_table(folder: Path, name: str) -> pd.DataFrame:
+    """A table that a finished run has; ValueError if it is missing or cannot be read."""
+    table = read_table(folder, name)
+    if table is None:
+        raise ValueError(f"partial: it has no {name}.csv")
+    return table
 
 
 def run_folders(root: Path) -> list[Path]:

@@ -26,11 +26,11 @@ COLOURS = {
     "plus_100": "#56B4E9",
     "target_density": "#E69F00",
     "conifer_restoration": "#0072B2",
-    "random_policy": "#999999",
+    "random_valid": "#999999",
 }
 MARKERS = {"eupg_var_lambda": "s", "ppo_gated": "^", "ppo_curriculum": "o", "eupg_fixed_lambda": "D",
            "zero_change": "x", "plus_100": "+", "target_density": "v", "conifer_restoration": "*",
-           "random_policy": "1"}  # fmt: skip
+           "random_valid": "1"}  # fmt: skip
 WEIGHT_COLOURS = "viridis"
 BINS = 40  # of a learning curve
 SEEDS_95 = "curves and bands: interquartile mean over training seeds and its 95 % interval (none with one seed)"

@@ -39,7 +39,7 @@ def make(results) -> pd.DataFrame:
     published = paper("physical_conflicts", index_col="variable").add_prefix("paper_")
     pairs, rows = results.study("mechanism_pairs"), []
     for pair in PAIRS:
-        row = {"change": pair}
+        row = {"change": pair, "conflict": "not played yet"}
         row |= next((published.loc[name].to_dict() for name in published.index if pair.startswith(name)), {})
         if pairs is not None:
             sites = pairs[pairs.pair == pair]

@@ -37,7 +37,7 @@ def make(results) -> pd.DataFrame:
     """Training by method, then what the benchmark measured."""
     rows, quoted = [], set()
     for what, (experiment, script, name) in TRAINED.items():
-        runs = [run for one in results.of(experiment, script) for run in one.runs if run.timing is not None]
+        runs = [run for one in results.of(experiment, script) for run in one.runs]
         columns = ["training", "evaluation", "environment"]
         table = pd.DataFrame([hours(run) for run in runs], columns=columns).astype(float)
         quoted.add(name)
