@@ -100,18 +100,17 @@ class Results:
 
     def _replicate(self, _, its_runs) -> Replicate:
         evaluation = pd.concat([run.evaluation for run in its_runs], ignore_index=True)
-        zero_change = self._zero_change(its_runs[0])
-        known = zero_change is not None and set(evaluation.seed) <= set(zero_change.seed)
-        return Replicate(its_runs, evaluation, metrics.gains(evaluation, zero_change) if known else None)
+        conditions = {name: its_runs[0].arguments[name] for name in ("env_id", "thaw_formulation", "site_seed")}
+        return Replicate(its_runs, evaluation, self.gains(evaluation, **conditions))
 
-    def _zero_change(self, run: runs.Run) -> pd.DataFrame | None:
-        """The longest evaluation of zero change in the run's environment, under its reward."""
-        def conditions(one):
-            return [one.arguments[name] for name in ("env_id", "thaw_formulation", "site_seed")]
-
-        zero_changes = [one for one in self.runs if one.script == "zero_change"]
-        same = [one.evaluation for one in zero_changes if conditions(one) == conditions(run)]
-        return max(same, key=len, default=None)
+    def gains(self, evaluation, env_id, thaw_formulation="asymmetric", site_seed=None) -> pd.DataFrame | None:
+        """An evaluation less zero change under the same reward; None if that was not evaluated on its episodes."""
+        conditions = {"env_id": env_id, "thaw_formulation": thaw_formulation, "site_seed": site_seed}
+        same = [run.evaluation for run in self.runs if run.script == "zero_change"
+                and all(run.arguments[name] == value for name, value in conditions.items())]  # fmt: skip
+        longest = max(same, key=len, default=None)
+        known = longest is not None and set(evaluation.seed) <= set(longest.seed)
+        return metrics.gains(evaluation, longest) if known else None
 
     def of(self, experiment: str, script: str, **flags) -> list[Replicate]:
         """Replicates of an experiment's row: the first of its jobs with these flags says which."""

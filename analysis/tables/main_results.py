@@ -87,14 +87,12 @@ def constant_plans(results) -> dict[tuple, list]:
     plans = results.study("constant_plans")
     rows = {}
     for env_id in ENVIRONMENTS:
-        zero_change = next((one.evaluation for one in results.rows.get(("zero_change", env_id, "default"), ())), None)
         for name, best in CONSTANT_PLANS.items():
             key = name, env_id, "default"
             rows[key] = []
             if plans is not None:
                 evaluation = as_evaluation(plans[plans.env_id == env_id], EVAL_WEIGHTS, best)
-                known = zero_change is not None and set(evaluation.seed) <= set(zero_change.seed)
-                rows[key] = [(evaluation, metrics.gains(evaluation, zero_change) if known else None)]
+                rows[key] = [(evaluation, results.gains(evaluation, env_id))]
     return rows
 
 
