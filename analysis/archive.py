@@ -20,7 +20,7 @@ from analysis import protocol, runs
 MOST_EPISODES = 6000
 FLOAT_FORMAT = "%.6g"
 # The evaluation is written last: it declares the run finished.
-TABLES = ("episodes", "updates", "timing", "evaluation_years", "evaluation_asymmetric", "evaluation")
+TABLES = ("episodes", "updates", "timing", "evaluation_years", "evaluation")
 
 
 @dataclass

@@ -33,7 +33,7 @@ class Args:
 
 def study(env_id: str, episodes: int) -> pd.DataFrame:
     """Returns of every planting action on the episodes of the evaluation."""
-    args = SimpleNamespace(env_id=env_id, mode="generalist", eval_episodes=episodes)
+    args = SimpleNamespace(env_id=env_id, mode="generalist", thaw_formulation="asymmetric", eval_episodes=episodes)
     tables = []
     for action in PLANTING:
         def probabilities(observations, masks, accrued_returns, action=action):

@@ -34,7 +34,6 @@ class Run:
     episodes: pd.DataFrame | None  # of the training; None for a fixed strategy
     timing: pd.DataFrame  # seconds by phase
     years: pd.DataFrame | None  # annual record of the sampled policy at KEPT_WEIGHTS: statistics over the episodes
-    asymmetric_evaluation: pd.DataFrame | None  # under the asymmetric reward, if trained on another formulation
 
     @property
     def script(self) -> str:
@@ -116,10 +115,7 @@ def read_run(folder: Path) -> Run:
     years = required_table(folder, "evaluation_years") if arguments["env_id"] in MODES else None
     if years is not None:
         years = years[(years.policy == "sampled") & years.preference.isin(KEPT_WEIGHTS)]
-    asymmetric = read_table(folder, "evaluation_asymmetric")
-    if asymmetric is not None:
-        asymmetric = asymmetric[asymmetric.policy == "sampled"]
-    return Run(folder, config, evaluation, episodes, timing, years, asymmetric)
+    return Run(folder, config, evaluation, episodes, timing, years)
 
 
 def required_table(folder: Path, name: str) -> pd.DataFrame:

@@ -96,6 +96,20 @@ def test_the_same_bytes_again(tables, tmp_path):
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 
 
+def test_other_formulations_are_judged_by_the_asymmetric_reward_too(tmp_path):
+    flags = {"thaw_formulation": "contrast", "vectorization": "lockstep"}
+    write_run(tmp_path / "runs" / "contrast", "ppo_gated", **flags)
+    file = tmp_path / "runs" / "contrast" / "evaluation.csv"
+    table = pd.read_csv(file)
+    table.assign(asymmetric_thaw_return=table.thaw_return - 5).to_csv(file, index=False)
+    make(tmp_path / "runs", tmp_path / "tables")
+    row = read(tmp_path / "tables", "thaw_formulations", "formulation").loc["contrast"]
+    assert (row.carbon, row.thaw, row.asymmetric_thaw) == pytest.approx((1, 1, -4))
+    # scalarised 2, 1, 2 of the weights 0, 0.5, 1; 5 (1 - w) less
+    assert (row.scalarized, row.asymmetric_scalarized) == pytest.approx((5 / 3, 5 / 3 - 2.5))
+    assert row.paper_scalarized_mean == 4.9
+
+
 # ---------------------------------------------------------------------------------- rows and runs
 
 def test_without_runs_it_names_the_commands(tmp_path):
@@ -212,11 +226,12 @@ class Studies:
 
 def test_physical_conflicts():
     pair = next(name for name in physical_conflicts.PAIRS if name.startswith("conifer fraction"))
-    table = {"pair": pair, "site_seed": range(4)}
+    table = {"site_seed": range(4)}
     for name in physical_conflicts.EFFECTS:
         table |= {f"lower_{name}": 0.0, f"upper_{name}": [1.0, 2.0, 3.0, 2.0]}
     table["upper_thaw_return"] = [-1.0, -1.2, -0.8, 0.2]
-    row = physical_conflicts.make(Studies(table)).set_index("change").loc[pair]
+    tables = [pd.DataFrame(table).assign(pair=name) for name in physical_conflicts.PAIRS]
+    row = physical_conflicts.make(Studies(pd.concat(tables))).set_index("change").loc[pair]
     assert (row.sites, row.carbon_return, row.thaw_return) == pytest.approx((4, 2, -0.7))
     half_width = 3.182446 * np.sqrt(2 / 3) / 2  # t of 3 degrees of freedom, sd of the four, root of four
     assert (row.carbon_return_low, row.carbon_return_high) == pytest.approx((2 - half_width, 2 + half_width))

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from analysis import metrics, protocol
 from analysis.experiments import METHODS
@@ -82,6 +83,10 @@ def finish(ax, legend: bool = True, legend_size: float = 7, **labels) -> None:
         no_data(ax, *(job.command for job in wanted))
         return
     ax.set(**labels)
+    for axis in (ax.xaxis, ax.yaxis):
+        if isinstance(axis.get_major_formatter(), ScalarFormatter):
+            axis.set_major_locator(MaxNLocator(5))
+            axis.get_major_formatter().set_useOffset(False)
     if wanted:
         experiments = " ".join(dict.fromkeys(job.experiment for job in wanted))
         note = [*textwrap.wrap("no run yet: " + ", ".join(job.script for job in wanted), 60),

@@ -29,6 +29,8 @@ COLUMNS = {
     "asymmetric_scalarized": "scalarised, asymmetric reward",
     "asymmetric_thaw": "thaw, asymmetric reward",
 }
+# Column of the evaluation of a run trained on another formulation: its thaw return under the asymmetric reward.
+ASYMMETRIC = "asymmetric_thaw_return"
 SPREADS = ["scalarized_sd", "carbon_sd", "thaw_sd"]
 
 
@@ -42,7 +44,7 @@ def replicates_of(results, formulation: str) -> list:
 
 
 def run_numbers(one) -> dict:
-    """Numbers of one run; those under the asymmetric reward if it was evaluated under it."""
+    """Numbers of one run; those under the asymmetric reward if the evaluation has it."""
     evaluation = one.evaluation
     row = front_metrics(evaluation) | {
         "carbon": evaluation.carbon_return.mean(), "carbon_sd": evaluation.carbon_return.std(),
@@ -51,12 +53,14 @@ def run_numbers(one) -> dict:
     }  # fmt: skip
     if one.gains is not None:
         row["gain_scalarized"] = metrics.mean_scalarized(one.gains)
-    run = one.runs[0]
-    asymmetric = run.arguments["thaw_formulation"] == "asymmetric"
-    judged = evaluation if asymmetric else run.asymmetric_evaluation
-    if judged is not None:
-        row["asymmetric_scalarized"] = metrics.mean_scalarized(judged)
-        row["asymmetric_thaw"] = judged.thaw_return.mean()
+    if one.runs[0].arguments["thaw_formulation"] == "asymmetric":
+        judged = evaluation
+    elif ASYMMETRIC in evaluation:
+        judged = evaluation.assign(thaw_return=evaluation[ASYMMETRIC])
+    else:
+        return row
+    row["asymmetric_scalarized"] = metrics.mean_scalarized(judged)
+    row["asymmetric_thaw"] = judged.thaw_return.mean()
     return row
 
 
