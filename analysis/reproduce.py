@@ -24,6 +24,7 @@ from sim.stands import available_cores
 
 Experiment = Literal["main", "fixed", "site", "thaw", "balanced", "controls", "mechanisms"]
 POLL_SECONDS, REPORT_SECONDS = 0.5, 30.0
+STOP_SECONDS = 30.0  # that a job has to end by itself
 LAST_LINES = 8  # of a failed job's output
 TAIL_BYTES = 4000
 
@@ -87,7 +88,11 @@ def stop(running: list[Running]) -> None:
     for one in running:
         one.process.terminate()
     for one in running:
-        one.process.wait()
+        try:
+            one.process.wait(STOP_SECONDS)
+        except subprocess.TimeoutExpired:
+            one.process.kill()
+            one.process.wait()
 
 
 def log_name(job: experiments.Job) -> str:

@@ -21,7 +21,7 @@ QUICK = "quick"  # folder of runs/ with the runs of `reproduce.py --quick`, whic
 KEPT_WEIGHTS = (0.0, 0.5, 1.0)
 
 # Arguments that do not make another row: what tells its runs apart, what the row has a column for, and the output.
-NOT_A_SETTING = ("seed", "site_seed", "preference", "eval_weights", "mode", "env_id", "run_dir", "overwrite")
+NOT_A_SETTING = ("seed", "site_seed", "preference", "mode", "env_id", "run_dir", "overwrite")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,12 @@ class Run:
 def setting(not_default: dict) -> str:
     """name=value of the arguments that make a row, "default" if there are none."""
     items = sorted((name, value) for name, value in not_default.items() if name not in NOT_A_SETTING)
-    return ", ".join(f"{name}={value}" for name, value in items) or "default"
+    return ", ".join(f"{name}={as_text(value)}" for name, value in items) or "default"
+
+
+def as_text(value) -> str:
+    """An argument as rows and folders name it."""
+    return ",".join(f"{v:g}" for v in value) if isinstance(value, (list, tuple)) else str(value)
 
 
 def identity(config: dict) -> str:
