@@ -87,6 +87,8 @@ def test_all_tables_in_all_formats(tables):
         rows = len(pd.read_csv(stem.with_suffix(".csv")))
         assert len(stem.with_suffix(".md").read_text().splitlines()) == rows + 2
         assert stem.with_suffix(".tex").read_text().count(r" \\") == rows + 1
+    contrast = next(line for line in (tables / "thaw_formulations.md").read_text().splitlines() if "contrast" in line)
+    assert contrast.startswith("| contrast | 0 | no run yet |")
     assert r"ppo\_curriculum" in (tables / "main_results.tex").read_text()
 
 

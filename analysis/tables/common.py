@@ -51,12 +51,14 @@ def cell(row: pd.Series, name: str) -> str:
 
 
 def readable(table: pd.DataFrame, columns: dict[str, str]) -> pd.DataFrame:
-    """The table's chosen columns as text: name -> heading. A row without runs says so in its first empty cell."""
+    """The table's chosen columns as text: name -> heading. A row without runs says so in the cell after `seeds`.
+
+    (Not in a table by weights, where the paper's weights are rows too.)
+    """
     cells = [[cell(row, name) for name in columns] for _, row in table.iterrows()]
     text = pd.DataFrame(cells, columns=list(columns.values()))
-    if "seeds" in table:
-        first = next(k for k, name in enumerate(columns) if name not in (*ROW_COLUMNS, "weight", "variable"))
-        text.iloc[(table.seeds == 0).to_numpy().nonzero()[0], first] = "no run yet"
+    if "seeds" in table and "weight" not in table:
+        text.iloc[(table.seeds == 0).to_numpy().nonzero()[0], list(columns).index("seeds") + 1] = "no run yet"
     return text
 
 
