@@ -70,7 +70,7 @@ def test_season_violations_runtime_details(tables):
     # of the six orders of three points one has no violation, two have one, three have two
     assert violations.noise_violations_percent == pytest.approx(100 * (0 + 1 + 1 + 1 + 1 + 2) / 12, abs=3)
     runtime = read(tables, "runtime", "quantity").ours
-    what = "curriculum PPO generalist, 300k steps, one core"
+    what = "curriculum PPO, generalist, 300,000 steps on one core"
     assert [runtime[f"{what}: {name}"] for name in ("training", "evaluation", "environment")] == pytest.approx(
         [0.2, 0.1, 75])
     details = read(tables, "detailed_objectives", "method").loc["ppo_curriculum"].set_index("weight")

@@ -83,9 +83,9 @@ def finish(ax, legend: bool = True, legend_size: float = 7, **labels) -> None:
         no_data(ax, *(job.command for job in wanted))
         return
     ax.set(**labels)
-    for axis in (ax.xaxis, ax.yaxis):
+    for axis, most in ((ax.xaxis, 4), (ax.yaxis, 5)):
         if isinstance(axis.get_major_formatter(), ScalarFormatter):
-            axis.set_major_locator(MaxNLocator(5))
+            axis.set_major_locator(MaxNLocator(most))
             axis.get_major_formatter().set_useOffset(False)
     if wanted:
         experiments = " ".join(dict.fromkeys(job.experiment for job in wanted))

@@ -10,11 +10,11 @@ from analysis.tables.common import over_seeds, paper
 TITLE = "Runtime"
 BENCHMARK = Path("results/benchmark.csv")
 COLUMNS = {"quantity": "quantity", "unit": "unit", "seeds": "runs", "ours": "ours", "paper": "paper", "source": "from"}
-TRAINED = {  # our row -> experiment, script, unit, the paper's row
-    "EUPG generalist, 300k steps, one core": ("main", "eupg_var_lambda", "training_generalist_300k_steps"),
-    "gated PPO generalist, 300k steps, one core": ("main", "ppo_gated", "training_generalist_300k_steps"),
-    "curriculum PPO generalist, 300k steps, one core": ("main", "ppo_curriculum", "training_generalist_300k_steps"),
-    "EUPG site-specific, 100k steps, one core": ("site", "eupg_fixed_lambda", "training_site_specific_100k_steps"),
+TRAINED = {  # our row -> experiment, script, the paper's row
+    "EUPG, generalist": ("main", "eupg_var_lambda", "training_generalist_300k_steps"),
+    "gated PPO, generalist": ("main", "ppo_gated", "training_generalist_300k_steps"),
+    "curriculum PPO, generalist": ("main", "ppo_curriculum", "training_generalist_300k_steps"),
+    "EUPG, site-specific": ("site", "eupg_fixed_lambda", "training_site_specific_100k_steps"),
 }
 PHASES = ("rollout", "update", "evaluation")
 
@@ -37,6 +37,7 @@ def make(results) -> pd.DataFrame:
     """Training by method, then what the benchmark measured."""
     rows, quoted = [], set()
     for what, (experiment, script, name) in TRAINED.items():
+        what = f"{what}, {results.first_job(experiment, script).steps:,} steps on one core"
         runs = [run for one in results.of(experiment, script) for run in one.runs]
         columns = ["training", "evaluation", "environment"]
         table = pd.DataFrame([hours(run) for run in runs], columns=columns).astype(float)
