@@ -16,13 +16,13 @@ SITE_SEEDS = (1, 2, 3, 4, 5)
 GENERALIST_STEPS, SITE_SPECIFIC_STEPS = 300_000, 100_000
 
 EXPERIMENTS = {
-    "main": "main table, strategies, curriculum selection: heuristics, and three methods with 10 seeds",
+    "main": "main table, strategies: heuristics, constant plans, and three methods with 10 seeds",
     "fixed": "learning asymmetry: EUPG with a fixed weight, one run a weight and seed",
     "site": "the same on single sites, one run a weight and site",
     "thaw": "the thaw reward's formulations: gated PPO",
     "balanced": "the three methods where both objectives weigh the same",
     "controls": "what of the curriculum it is that helps",
-    "mechanisms": "physical conflicts, counterfactual pairs, constant plans, warming of selected sites",
+    "mechanisms": "physical conflicts, counterfactual pairs, warming of selected sites",
 }
 
 
@@ -113,9 +113,9 @@ def seeds_of(number: int, chosen: list[int] | None) -> list[int]:
 
 
 def main_table(seeds) -> list[Job]:
-    """Heuristics, then the three methods, a seed of all before the next."""
+    """Heuristics and constant plans, then the three methods, a seed of all before the next."""
     methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in METHODS]
-    return [Job("main", script) for script in HEURISTICS] + methods
+    return [Job("main", script) for script in (*HEURISTICS, "constant_plans")] + methods
 
 
 def fixed_weights(seeds) -> list[Job]:
@@ -166,7 +166,7 @@ def controls(seeds) -> list[Job]:
 
 def mechanisms(seeds) -> list[Job]:
     """Studies that need no training; the warming of selected sites reads the curriculum's runs."""
-    return [Job("mechanisms", script) for script in STUDIES]
+    return [Job("mechanisms", script) for script in ("mechanism_pairs", "site_warming")]
 
 
 JOBS_OF = {"main": main_table, "fixed": fixed_weights, "site": single_sites, "thaw": thaw_formulations,

@@ -10,7 +10,7 @@ from tiny_runs import TINY_RUNS
 from analysis import experiments, reproduce
 from analysis.experiments import Job
 
-COUNTS = {"main": 35, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 15, "mechanisms": 3}
+COUNTS = {"main": 36, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 15, "mechanisms": 2}
 
 
 def test_experiments():
@@ -19,7 +19,7 @@ def test_experiments():
     assert [job.experiment for job in jobs] == sorted((job.experiment for job in jobs), key=list(COUNTS).index)
     assert len({job.command for job in jobs}) == len(jobs)
     # heuristics first, then a seed of every method before the next
-    assert [(job.script, job.flags["seed"]) for job in jobs[5:9]] == [
+    assert [(job.script, job.flags["seed"]) for job in jobs[6:10]] == [
         ("eupg_var_lambda", 1), ("ppo_gated", 1), ("ppo_curriculum", 1), ("eupg_var_lambda", 2)]
     assert sum(job.steps for job in jobs if job.experiment == "main") == 30 * 300_000
     assert len(experiments.jobs(["fixed", "site"], [2])) == 5 + 6
