@@ -130,6 +130,16 @@ def significant_violations_percent(evaluation: pd.DataFrame) -> float:
     return 100 * float(_violates(change, half_width).mean())
 
 
+def expected_violations_percent(returns: np.ndarray, repetitions: int = 2000) -> float:
+    """What `violations_percent` is on average if the points come in a random order [%]: of a policy that ignores
+    the preference and differs between weights by chance alone. Deterministic.
+    """
+    returns = np.asarray(returns, dtype=float)
+    generator = np.random.default_rng(0)
+    orders = np.stack([generator.permutation(len(returns)) for _ in range(repetitions)])
+    return 100 * float(_violates(np.diff(returns[orders], axis=1)).mean()) if len(returns) > 1 else np.nan
+
+
 def preference_response(evaluation: pd.DataFrame) -> pd.DataFrame:
     """How both returns follow the preference, over the paired episodes, with 95 % intervals.
 
@@ -167,3 +177,17 @@ def bootstrap_interval(values: np.ndarray, repetitions: int = 50_000) -> tuple[f
     resampled = np.random.default_rng(0).choice(values, (repetitions, len(values)))
     low, high = np.percentile(stats.trim_mean(resampled, 0.25, axis=1), [2.5, 97.5])
     return float(low), float(high)
+
+
+def bootstrap_band(curves: np.ndarray, repetitions: int = 2000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """IQM of curves (seeds, points) over the seeds, and its 95 % percentile bootstrap interval at each point.
+
+    Whole curves are resampled; the interval is NaN for fewer than two seeds. Deterministic.
+    """
+    curves = np.asarray(curves, dtype=float)
+    middle = stats.trim_mean(curves, 0.25, axis=0)
+    if len(curves) < 2:
+        return middle, np.full_like(middle, np.nan), np.full_like(middle, np.nan)
+    chosen = np.random.default_rng(0).integers(len(curves), size=(repetitions, len(curves)))
+    low, high = np.percentile(stats.trim_mean(curves[chosen], 0.25, axis=1), [2.5, 97.5], axis=0)
+    return middle, low, high

@@ -1,99 +1,171 @@
-import json
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from tiny_runs import TINY_RUNS, write_run
 
 from analysis import make_tables
-from analysis.evaluation import EVALUATION_COLUMNS
+from analysis.tables import curriculum_selection, physical_conflicts
 
-WEIGHTS = [0.0, 0.5, 1.0]
-
-
-def write_run(folder, script, seed=1, carbon=(0, 1, 2), thaw=(2, 1, 0), env_id="boreal-generalist-v0",
-              **not_default):
-    """A finished run whose mean returns per weight are the given ones."""
-    rows = []
-    for policy, shift in (("greedy", 100.0), ("sampled", 0.0)):
-        for weight, c, t in zip(WEIGHTS, carbon, thaw, strict=True):
-            for episode, site in enumerate((-1.0, 1.0)):
-                rows.append({"policy": policy, "preference": weight, "episode": episode, "seed": episode,
-                             "carbon_return": c + site + shift, "thaw_return": t + 3 * site + shift})
-    episodes = pd.DataFrame(rows, columns=EVALUATION_COLUMNS)
-    w = episodes.preference
-    episodes["scalarized_return"] = w * episodes.carbon_return + (1 - w) * episodes.thaw_return
-    folder.mkdir(parents=True)
-    episodes.to_csv(folder / "evaluation.csv", index=False)
-    arguments = {"seed": seed, "env_id": env_id, "thaw_formulation": "asymmetric", "site_seed": None,
-                 "eval_weights": WEIGHTS, "eval_episodes": 2, **not_default}
-    config = {"script": script, "arguments": arguments, "not_default": not_default}
-    (folder / "config.json").write_text(json.dumps(config))
+MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")
 
 
-def make(tmp_path):
-    make_tables.main(tmp_path / "runs", tmp_path / "tables")
-    table = pd.read_csv(tmp_path / "tables" / "main_results.csv")
-    return table.set_index(["method", "environment", "setting"])
+def make(runs, folder):
+    make_tables.main(make_tables.Args(runs_dir=(runs,), tables_dir=folder))
+    return pd.read_csv(folder / "main_results.csv").set_index(["method", "environment", "setting"])
 
 
-DEFAULT = ("ppo_curriculum", "boreal-generalist-v0", "default")
+def read(folder, name, index):
+    return pd.read_csv(folder / f"{name}.csv").set_index(index)
 
 
-def test_without_runs_it_names_the_commands(tmp_path):
-    with pytest.raises(SystemExit) as exit:
-        make_tables.main(tmp_path / "runs", tmp_path / "tables")
-    assert exit.value.code not in (0, None)
-    for command in ("python cleanrl_style/ppo_curriculum.py --seed 1",
-                    "python baselines_heuristic/zero_change.py --seed 1 --env-id boreal-balanced-v0"):
-        assert command in str(exit.value)
-    assert not (tmp_path / "tables").exists()
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory):
+    """Folder with the tables of the tiny runs."""
+    folder = tmp_path_factory.mktemp("tables")
+    make(TINY_RUNS, folder)
+    return folder
 
 
-def test_metrics_of_one_run_beside_the_papers(tmp_path):
-    write_run(tmp_path / "runs" / "whatever", "ppo_curriculum")
-    write_run(tmp_path / "runs" / "zero", "zero_change", carbon=(-1, -1, -1), thaw=(1, 1, 1))
-    row = make(tmp_path).loc[DEFAULT]
+# ------------------------------------------------------------------- the committed runs, by hand
+
+def test_main_results(tables):
+    row = read(tables, "main_results", ["method", "environment", "setting"]).loc[MAIN]
     assert row.seeds == 1
     assert row.scalarized == pytest.approx((2 + 1 + 2) / 3)
     assert row.hypervolume == pytest.approx(2 * 4 + 1 * 3 + 1 * 2)  # (0, 2), (1, 1), (2, 0) above (-2, -2)
     assert row.sparsity == pytest.approx(2)
+    assert row.cardinality == 3
+    # weights w and 1 - w of (0, 2) or (2, 0): twice the larger, on average over 50 weights a little above 1.5
+    assert row.expected_utility == pytest.approx(2 * np.mean([max(k, 49 - k) / 49 for k in range(50)]))
     assert row.gain_hypervolume == pytest.approx(3 * 3 + 1 * 2 + 1 * 1)  # gains (1, 1), (2, 0), (3, -1)
     assert row.gain_scalarized == pytest.approx((1 + 1 + 3) / 3)
-    assert row.violations_percent == 0
+    assert (row.carbon_change, row.thaw_change, row.carbon_slope, row.thaw_slope) == pytest.approx((2, -2, 2, -2))
     assert np.isnan(row.scalarized_low)
+    # of six episodes: 2 -+ 3, 1 -+ 2, 2 -+ 1
+    assert row.sd_over_episodes == pytest.approx(np.std([-1, 5, -1, 3, 1, 3], ddof=1))
     assert (row.paper_scalarized, row.paper_sd_over_episodes, row.paper_hypervolume) == (8.5, 3.0, 84.3)
     assert row.paper_detail_hypervolume == pytest.approx(119.80, abs=0.005)
-    assert row.paper_violations_percent == 50
+
+
+def test_strategies_and_fluxes(tables):
+    row = read(tables, "learned_strategies", "method").loc["ppo_curriculum"]
+    assert (row.density, row.final_density, row.conifer_fraction, row.warming) == pytest.approx((800, 1200, 0.5, 6))
+    assert (row.carbon, row.thaw, row.paper_carbon) == pytest.approx((1, 1, 8))
+    flux = read(tables, "warming_flux", "formulation")
+    assert flux.loc["asymmetric", "zero_change_warming"] == 6 and flux.loc["asymmetric", "seeds"] == 0
+    assert flux.paper_warming.tolist() == [0.1, 2.0, 5.0]
+
+
+def test_season_violations_runtime_details(tables):
+    season = read(tables, "growing_season_correlations", ["method", "variable"]).loc["ppo_curriculum"]
+    # returns of both episodes differ by 6 at each weight, whose means differ: r = cov / (sd sd) = 30 / sqrt(100 * 29/3)
+    assert season.r.to_dict() == pytest.approx({"thaw_return": 30 / np.sqrt(100 * 29 / 3), "latent_heat_mj_m2": 1,
+                                                "ground_shortwave_mj_m2": -1})
+    assert season.paper_r.tolist() == [0.65, 0.82, -0.75]
+    violations = read(tables, "lambda_violations", ["method", "environment", "setting"]).loc[MAIN]
+    assert (violations.pairs, violations.violations_percent, violations.paper_violations_percent) == (2, 0, 50)
+    # of the six orders of three points one has no violation, two have one, three have two
+    assert violations.noise_violations_percent == pytest.approx(100 * (0 + 1 + 1 + 1 + 1 + 2) / 12, abs=3)
+    runtime = read(tables, "runtime", "quantity").ours
+    what = "curriculum PPO, generalist, 300,000 steps on one core"
+    assert [runtime[f"{what}: {name}"] for name in ("training", "evaluation", "environment")] == pytest.approx(
+        [0.2, 0.1, 75])
+    details = read(tables, "detailed_objectives", "method").loc["ppo_curriculum"].set_index("weight")
+    assert details.index.tolist() == [0, 0.25, 0.5, 0.75, 1]  # the paper's too
+    assert details.carbon_return.dropna().tolist() == [0, 1, 2] and details.seeds.tolist() == [1, 0, 1, 0, 1]
+    assert details.paper_carbon_mean.tolist() == [2.5, 7.0, 8.5, 9.5, 10.0]
+    assert details.carbon_gain.dropna().tolist() == [1, 2, 3]
+
+
+def test_all_tables_in_all_formats(tables):
+    assert len(make_tables.TABLES) == 10
+    for module in make_tables.TABLES:
+        stem = tables / make_tables.name_of(module)
+        rows = len(pd.read_csv(stem.with_suffix(".csv")))
+        assert len(stem.with_suffix(".md").read_text().splitlines()) == rows + 2
+        assert stem.with_suffix(".tex").read_text().count(r" \\") == rows + 1
+    contrast = next(line for line in (tables / "thaw_formulations.md").read_text().splitlines() if "contrast" in line)
+    assert contrast.startswith("| contrast | 0 | no run yet |")
+    assert r"ppo\_curriculum" in (tables / "main_results.tex").read_text()
+
+
+def test_the_same_bytes_again(tables, tmp_path):
+    make(TINY_RUNS, tmp_path)
+    for path in tables.iterdir():
+        assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
+
+
+def test_other_formulations_are_judged_by_the_asymmetric_reward_too(tmp_path):
+    flags = {"thaw_formulation": "contrast", "vectorization": "lockstep"}
+    write_run(tmp_path / "runs" / "contrast", "ppo_gated", **flags)
+    file = tmp_path / "runs" / "contrast" / "evaluation.csv"
+    table = pd.read_csv(file)
+    table.assign(asymmetric_thaw_return=table.thaw_return - 5).to_csv(file, index=False)
+    make(tmp_path / "runs", tmp_path / "tables")
+    row = read(tmp_path / "tables", "thaw_formulations", "formulation").loc["contrast"]
+    assert (row.carbon, row.thaw, row.asymmetric_thaw) == pytest.approx((1, 1, -4))
+    # scalarised 2, 1, 2 of the weights 0, 0.5, 1; 5 (1 - w) less
+    assert (row.scalarized, row.asymmetric_scalarized) == pytest.approx((5 / 3, 5 / 3 - 2.5))
+    assert row.paper_scalarized_mean == 4.9
+
+
+# ---------------------------------------------------------------------------------- rows and runs
+
+def test_without_runs_it_names_the_commands(tmp_path):
+    with pytest.raises(SystemExit) as exit:
+        make(tmp_path / "runs", tmp_path / "tables")
+    assert exit.value.code not in (0, None)
+    for command in ("python cleanrl_style/ppo_curriculum.py --seed 1 --vectorization lockstep",
+                    "python baselines_heuristic/zero_change.py --env-id boreal-balanced-v0"):
+        assert command in str(exit.value)
+    assert not (tmp_path / "tables").exists()
 
 
 def test_seeds_are_aggregated_and_settings_kept_apart(tmp_path):
     for seed in range(1, 5):
         write_run(tmp_path / "runs" / str(seed), "ppo_curriculum", seed, carbon=(seed, 1 + seed, 2 + seed))
     write_run(tmp_path / "runs" / "short", "ppo_curriculum", carbon=(9, 9, 9), total_timesteps=100)
-    table = make(tmp_path)
-    row = table.loc[DEFAULT]
+    table = make(tmp_path / "runs", tmp_path / "tables")
+    row = table.loc[("ppo_curriculum", "boreal-generalist-v0", "default")]
     # scalarised returns (5 + 1.5 seed) / 3; the interquartile mean of four seeds is that of the middle two
     assert row.seeds == 4
     assert row.scalarized == pytest.approx((5 + 1.5 * 2.5) / 3)
     assert row.scalarized_low < row.scalarized < row.scalarized_high
     short = table.loc[("ppo_curriculum", "boreal-generalist-v0", "total_timesteps=100")]
     assert short.seeds == 1 and short.scalarized == pytest.approx((2 + 5 + 9) / 3)
+    assert np.isnan(short.paper_scalarized)  # a control is no row of the paper's
+
+
+def test_agents_of_one_weight_form_a_front(tmp_path, capsys):
+    for seed in (1, 2):
+        for weight in (0.0, 0.25, 0.5, 0.75, 1.0)[: 5 if seed == 1 else 4]:
+            write_run(tmp_path / "runs" / f"{seed}-{weight}", "eupg_fixed_lambda", seed, carbon=(weight,),
+                      thaw=(1 - weight,), weights=(weight,), preference=weight, vectorization="lockstep")
+    row = make(tmp_path / "runs", tmp_path / "tables").loc[
+        ("eupg_fixed_lambda", "boreal-generalist-v0", "vectorization=lockstep")]
+    assert row.seeds == 1 and row.cardinality == 5 and row.sparsity == pytest.approx(2 * 0.25**2)
+    assert "eupg_fixed_lambda, boreal-generalist-v0, seed 2: partial, without the agents of the weights 1" in \
+        capsys.readouterr().err
 
 
 def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):
     write_run(tmp_path / "runs" / "zero", "zero_change")
-    table = make(tmp_path)
+    table = make(tmp_path / "runs", tmp_path / "tables")
     out = capsys.readouterr().out
-    assert table.loc[DEFAULT].seeds == 0 and np.isnan(table.loc[DEFAULT].scalarized)
+    assert table.loc[MAIN].seeds == 0 and np.isnan(table.loc[MAIN].scalarized)
     assert "no run yet" in (tmp_path / "tables" / "main_results.md").read_text()
-    assert "python cleanrl_style/ppo_curriculum.py --seed 1\n" in out
-    assert "python baselines_heuristic/zero_change.py --seed 1\n" not in out
+    assert "python cleanrl_style/ppo_curriculum.py --seed 1 --vectorization lockstep\n" in out
+    assert "python baselines_heuristic/zero_change.py\n" not in out
+    assert "python analysis/mechanism_pairs.py\n" in out
 
 
 def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
     runs = tmp_path / "runs"
-    for name in ("good", "unfinished", "config", "truncated", "columns", "infinite", "twin"):
-        write_run(runs / name, "ppo_curriculum", seed=1 if name == "twin" else len(name))
+    for name in ("good", "unfinished", "config", "truncated", "columns", "infinite", "partial", "broken-years", "twin"):
+        write_run(runs / name, "ppo_curriculum", seed=1 if name == "twin" else len(name) + 20)
     write_run(runs / "zz-first", "ppo_curriculum", seed=1)
     (runs / "unfinished" / "evaluation.csv").unlink()
     (runs / "config" / "config.json").write_text('{"script": "ppo_curriculum"}')
@@ -102,37 +174,88 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
                          ("infinite", lambda table: table.assign(thaw_return=np.inf))]:
         file = runs / name / "evaluation.csv"
         change(pd.read_csv(file)).to_csv(file, index=False)
-    table = make(tmp_path)
-    assert table.loc[DEFAULT].seeds == 2
+    (runs / "partial" / "episodes.csv").unlink()
+    (runs / "broken-years" / "evaluation_years.csv").unlink()
+    (runs / "broken-years" / "evaluation_years.csv.gz").write_bytes(b"no gzip")
+    table = make(runs, tmp_path / "tables")
+    assert table.loc[("ppo_curriculum", "boreal-generalist-v0", "default")].seeds == 2
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 6
+    assert len(lines) == 8
     for name, reason in [("unfinished", "no evaluation.csv"), ("config", "config.json"),
                          ("truncated", "5 episodes"), ("columns", "lacks the column thaw_return"),
-                         ("infinite", "not finite"), ("zz-first", "the same run as")]:
+                         ("infinite", "not finite"),
+                         ("partial", "partial: it has no episodes.csv"), ("broken-years", "evaluation_years.csv.gz"),
+                         ("zz-first", "the same run as")]:
         assert sum(str(runs / name) + ":" in line and reason in line for line in lines) == 1, name
 
 
+def test_the_same_run_in_two_folders_counts_once(tmp_path, capsys):
+    for name in ("runs", "archive"):
+        shutil.copytree(TINY_RUNS / "curriculum", tmp_path / name / "curriculum")
+    make_tables.main(make_tables.Args(runs_dir=(tmp_path / "archive", tmp_path / "runs"), tables_dir=tmp_path / "t"))
+    assert read(tmp_path / "t", "main_results", ["method", "environment", "setting"]).loc[MAIN].seeds == 1
+    assert "left out" not in capsys.readouterr().err
+
+
 def test_gains_need_zero_change_on_the_same_episodes(tmp_path, capsys):
-    write_run(tmp_path / "runs" / "ours", "ppo_curriculum")
+    write_run(tmp_path / "runs" / "ours", "ppo_curriculum", vectorization="lockstep")
     write_run(tmp_path / "runs" / "zero", "zero_change", env_id="boreal-balanced-v0")
-    assert np.isnan(make(tmp_path).loc[DEFAULT].gain_hypervolume)
+    assert np.isnan(make(tmp_path / "runs", tmp_path / "tables").loc[MAIN].gain_hypervolume)
     assert "zero_change.py" in capsys.readouterr().out
 
 
-def test_a_policy_without_preference_has_neither_sparsity_nor_violations(tmp_path):
-    write_run(tmp_path / "runs" / "zero", "zero_change", carbon=(1, 1, 1), thaw=(0, 0, 0))
-    row = make(tmp_path).loc[("zero_change", "boreal-generalist-v0", "default")]
-    assert np.isnan(row.sparsity) and np.isnan(row.violations_percent)
-    assert row.hypervolume == pytest.approx(6) and row.gain_hypervolume == pytest.approx(4)
+def test_a_policy_without_preference_has_neither_sparsity_nor_response(tables):
+    key = ("zero_change", "boreal-generalist-v0", "default")
+    row = read(tables, "main_results", ["method", "environment", "setting"]).loc[key]
+    assert np.isnan(row.sparsity) and np.isnan(row.carbon_change)
+    assert row.hypervolume == pytest.approx(1 * 3) and row.gain_hypervolume == pytest.approx(4)
 
 
-def test_all_formats_have_the_same_rows(tmp_path):
-    write_run(tmp_path / "runs" / "ours", "ppo_curriculum")
-    rows = len(make(tmp_path))
-    tables = tmp_path / "tables"
-    assert len((tables / "main_results.md").read_text().splitlines()) == rows + 2
-    latex = (tables / "main_results.tex").read_text()
-    assert latex.count(r"\\") == rows + 1 and r"ppo\_curriculum" in latex
-    details = pd.read_csv(tables / "detailed_objectives.csv")
-    assert details.weight.tolist() == WEIGHTS and details.carbon_return.tolist() == [0, 1, 2]
-    assert details.paper_carbon_mean.tolist() == [2.5, 8.5, 10.0]
+# ------------------------------------------------------------------------------ tables of studies
+
+class Studies:
+    """Stands for Results, with one study."""
+
+    def __init__(self, table, curricula=()):
+        self.table, self.curricula = pd.DataFrame(table), curricula
+
+    def study(self, name):
+        return self.table
+
+    def of(self, experiment, script):
+        return self.curricula
+
+
+def test_physical_conflicts():
+    pair = next(name for name in physical_conflicts.PAIRS if name.startswith("conifer fraction"))
+    table = {"site_seed": range(4)}
+    for name in physical_conflicts.EFFECTS:
+        table |= {f"lower_{name}": 0.0, f"upper_{name}": [1.0, 2.0, 3.0, 2.0]}
+    table["upper_thaw_return"] = [-1.0, -1.2, -0.8, 0.2]
+    tables = [pd.DataFrame(table).assign(pair=name) for name in physical_conflicts.PAIRS]
+    row = physical_conflicts.make(Studies(pd.concat(tables))).set_index("change").loc[pair]
+    assert (row.sites, row.carbon_return, row.thaw_return) == pytest.approx((4, 2, -0.7))
+    half_width = 3.182446 * np.sqrt(2 / 3) / 2  # t of 3 degrees of freedom, sd of the four, root of four
+    assert (row.carbon_return_low, row.carbon_return_high) == pytest.approx((2 - half_width, 2 + half_width))
+    assert row.conflict == "unclear"  # thaw's interval is 0.98 on either side
+    assert row.share_of_sites_in_conflict == 75 and row.paper_conflict == "yes (direct)"
+
+
+def test_verdict():
+    assert physical_conflicts.verdict((1, 0.5), (-1, 0.5)) == "yes"
+    assert physical_conflicts.verdict((-1, 0.5), (-1, 0.5)) == "no"
+    assert physical_conflicts.verdict((1, 0.5), (-1, 1.5)) == "unclear"
+
+
+def test_curriculum_selection():
+    sites = {"seed": 1, "site_seed": range(4), "selected": [1, 1, 0, 0], "latitude_deg": [60, 62, 58, 60],
+             "warming_mj_m2": [4, 6, 8, 10], "cooling_mj_m2": 1, "thaw_return": [1, 1, 2, 2]}
+    table = curriculum_selection.make(Studies(sites)).set_index("category")
+    assert table.latitude.tolist() == [61, 59, 2] and table.warming.tolist() == [5, 9, -4]
+    assert table.paper_warming.dropna().tolist() == [0.5, 8.0]
+
+
+def test_studies_leave_out_nothing_silently(tmp_path):
+    folder = Path(tmp_path)
+    make(TINY_RUNS, folder)
+    assert "not played yet" in (folder / "physical_conflicts.md").read_text()

@@ -1,9 +1,11 @@
+import itertools
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from analysis import metrics
-from analysis.make_tables import PAPER_TABLES
+from analysis.tables.common import PAPER_TABLES
 
 FRONT = np.array([(0, 3), (1, 2), (3, 0)])
 
@@ -127,3 +129,23 @@ def test_bootstrap_interval():
     assert 0.6 < (high - low) / (4 * values.std() * np.sqrt(1.2 / 10)) < 1.4
     assert metrics.bootstrap_interval([2.0, 2.0, 2.0]) == (2.0, 2.0)
     assert np.isnan(metrics.bootstrap_interval([2.0])).all()
+
+
+def test_violations_expected_of_a_random_order():
+    # three points on a front: one of their six orders has no violation, two have one of two, three have two
+    front = np.array([[0.0, 2.0], [1.0, 1.0], [2.0, 0.0]])
+    orders = [front[list(order)] for order in itertools.permutations(range(3))]
+    exact = np.mean([metrics.violations_percent(order) for order in orders])
+    assert metrics.expected_violations_percent(front) == pytest.approx(exact, abs=3)
+    assert metrics.expected_violations_percent(front) == metrics.expected_violations_percent(front)
+    assert np.isnan(metrics.expected_violations_percent(front[:1]))
+
+
+def test_band_is_the_interval_at_each_point():
+    curves = np.random.default_rng(1).normal(size=(7, 3))
+    middle, low, high = metrics.bootstrap_band(curves)
+    for k in range(3):
+        assert middle[k] == pytest.approx(metrics.iqm(curves[:, k]))
+        assert (low[k], high[k]) == pytest.approx(metrics.bootstrap_interval(curves[:, k]), abs=0.15)
+    middle, low, high = metrics.bootstrap_band(curves[:1])
+    assert middle == pytest.approx(curves[0]) and np.isnan([low, high]).all()

@@ -1,0 +1,206 @@
+"""Every experiment of the paper, and the controls that its claims need, in the order that fills the tables first."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from analysis.evaluation import MODES
+from analysis.runs import setting
+
+ROOT = Path(__file__).parents[1]
+HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
+METHODS = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum")  # conditioned on the preference
+TRAINED = (*METHODS, "eupg_fixed_lambda")
+STUDIES = ("constant_plans", "mechanism_pairs", "site_warming")
+WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
+SITE_SEEDS = (1, 2, 3, 4, 5)
+GENERALIST_STEPS, SITE_SPECIFIC_STEPS = 300_000, 100_000
+
+EXPERIMENTS = {
+    "main": "main table, strategies: heuristics, constant plans, and three methods with 10 seeds",
+    "fixed": "learning asymmetry: EUPG with a fixed weight, one run a weight and seed",
+    "site": "the same on single sites, one run a weight and site",
+    "thaw": "the thaw reward's formulations: gated PPO",
+    "balanced": "the three methods where both objectives weigh the same",
+    "controls": "what of the curriculum it is that helps",
+    "mechanisms": "physical conflicts, counterfactual pairs, warming of selected sites",
+}
+
+
+@dataclass(frozen=True)
+class Job:
+    """One command: a script and its flags, as name -> value."""
+
+    experiment: str
+    script: str
+    flags: dict = field(default_factory=dict)
+
+    @property
+    def path(self) -> str:
+        """The script's file, relative to the repository."""
+        folder = "analysis" if self.is_study else "cleanrl_style" if self.trains else "baselines_heuristic"
+        return f"{folder}/{self.script}.py"
+
+    @property
+    def exists(self) -> bool:
+        """Whether the project has the script."""
+        return (ROOT / self.path).exists()
+
+    @property
+    def is_study(self) -> bool:
+        """Whether it is a study of `analysis`, which leaves a table, not a run."""
+        return self.script in STUDIES
+
+    @property
+    def trains(self) -> bool:
+        """Whether it trains an agent; else it evaluates a fixed strategy, or is a study."""
+        return self.script in TRAINED
+
+    @property
+    def arguments(self) -> list[str]:
+        """The flags as on the command line."""
+        words = []
+        for name, value in self.flags.items():
+            flag = f"--{name.replace('_', '-')}"
+            values = value if isinstance(value, tuple) else () if value is True else (value,)
+            words += [flag, *(f"{v:g}" if isinstance(v, float) else str(v) for v in values)]
+        return words
+
+    @property
+    def command(self) -> str:
+        """The command line, to be typed in the repository."""
+        return " ".join(["python", self.path, *self.arguments])
+
+    @property
+    def env_id(self) -> str:
+        """The environment that the flags mean."""
+        mode = self.flags.get("mode", "generalist")
+        return self.flags.get("env_id") or next(name for name, its_mode in MODES.items() if its_mode == mode)
+
+    @property
+    def steps(self) -> int:
+        """Environment steps of its training."""
+        default = SITE_SPECIFIC_STEPS if self.flags.get("mode") == "site-specific" else GENERALIST_STEPS
+        return self.flags.get("total_timesteps", default) if self.trains else 0
+
+    @property
+    def row(self) -> tuple[str, str, str]:
+        """(script, environment, setting): the row of a table that its run belongs to."""
+        return self.script, self.env_id, setting(self.flags)
+
+    def made(self, config: dict) -> bool:
+        """Whether a run with this config.json is this job's."""
+        arguments, changed = config["arguments"], set(config["not_default"])
+        return (
+            config["script"] == self.script
+            and arguments["env_id"] == self.env_id
+            and all(arguments.get(name) == (list(value) if isinstance(value, tuple) else value)
+                    for name, value in self.flags.items() if name not in OUTPUT)
+            and changed <= {*self.flags, "env_id", "mode"}
+        )
+
+
+OUTPUT = ("run_dir", "overwrite")  # arguments that no config.json has
+
+
+def trained(experiment: str, script: str, seed: int, **flags) -> Job:
+    """A training run, in lockstep: on one core the faster of the two."""
+    return Job(experiment, script, {"seed": seed, "vectorization": "lockstep", **flags})
+
+
+def seeds_of(number: int, chosen: list[int] | None) -> list[int]:
+    """Training seeds 1 .. number, or those of them that were chosen."""
+    return [seed for seed in range(1, number + 1) if chosen is None or seed in chosen]
+
+
+def main_table(seeds) -> list[Job]:
+    """Heuristics and constant plans, then the three methods, a seed of all before the next."""
+    methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in METHODS]
+    return [Job("main", script) for script in (*HEURISTICS, "constant_plans")] + methods
+
+
+def fixed_weights(seeds) -> list[Job]:
+    """EUPG trained for one weight, on all sites."""
+    return [trained("fixed", "eupg_fixed_lambda", seed, preference=weight)
+            for seed in seeds_of(3, seeds) for weight in WEIGHTS]  # fmt: skip
+
+
+def single_sites(seeds) -> list[Job]:
+    """EUPG trained for one weight, on one site; the site's seed is the training seed too."""
+    jobs = []
+    for seed in seeds_of(len(SITE_SEEDS), seeds):
+        site = {"mode": "site-specific", "site_seed": SITE_SEEDS[seed - 1]}
+        jobs.append(Job("site", "zero_change", site))
+        jobs += [trained("site", "eupg_fixed_lambda", seed, preference=weight, **site) for weight in WEIGHTS]
+    return jobs
+
+
+def thaw_formulations(seeds) -> list[Job]:
+    """Gated PPO under the two formulations that are not the default."""
+    formulations = ("contrast", "raw_degree_days")
+    return [Job("thaw", "zero_change", {"thaw_formulation": formulation}) for formulation in formulations] + [
+        trained("thaw", "ppo_gated", seed, thaw_formulation=formulation)
+        for seed in seeds_of(5, seeds) for formulation in formulations
+    ]  # fmt: skip
+
+
+def balanced(seeds) -> list[Job]:
+    """The three methods where both returns vary equally between policies."""
+    env = {"env_id": "boreal-balanced-v0"}
+    return [Job("balanced", script, env) for script in HEURISTICS] + [
+        trained("balanced", script, seed, **env) for seed in seeds_of(5, seeds) for script in METHODS
+    ]
+
+
+def controls(seeds) -> list[Job]:
+    """No selection is ppo_gated of the main table; here half and twice its budget, and other ways to select.
+
+    Half the budget has about as many transitions in gradients as the curriculum, which trains on half of its episodes.
+    """
+    variants = (
+        ("ppo_gated", {"total_timesteps": GENERALIST_STEPS // 2}),
+        ("ppo_curriculum", {"raw_selector": True}),
+        ("ppo_gated", {"total_timesteps": 2 * GENERALIST_STEPS}),
+    )
+    return [trained("controls", script, seed, **flags) for script, flags in variants for seed in seeds_of(5, seeds)]
+
+
+def mechanisms(seeds) -> list[Job]:
+    """Studies that need no training; the warming of selected sites reads the curriculum's runs."""
+    return [Job("mechanisms", script) for script in ("mechanism_pairs", "site_warming")]
+
+
+JOBS_OF = {"main": main_table, "fixed": fixed_weights, "site": single_sites, "thaw": thaw_formulations,
+           "balanced": balanced, "controls": controls, "mechanisms": mechanisms}  # fmt: skip
+
+
+def jobs(only=tuple(EXPERIMENTS), seeds: list[int] | None = None) -> list[Job]:
+    """All jobs of the chosen experiments and seeds, in order."""
+    return [job for name in EXPERIMENTS if name in only for job in JOBS_OF[name](seeds)]
+
+
+# ------------------------------------------------------------------------------------------------- in small
+
+QUICK_DIR, QUICK_ARCHIVE_DIR = Path("runs/quick"), Path("results/quick/runs")
+QUICK_STEPS = 3200
+QUICK_EVALUATION = {"eval_episodes": 2, "eval_weights": (0.0, 0.5, 1.0)}
+
+
+def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path = QUICK_DIR) -> list[Job]:
+    """Every kind of job once, in seconds: one seed, the outer weights, one other formulation, tiny budgets."""
+    small = []
+    for number, job in enumerate(jobs(only, [1])):
+        flags = dict(job.flags)
+        if flags.get("preference", 0.0) not in (0.0, 1.0) or flags.get("thaw_formulation") == "raw_degree_days":
+            continue
+        if job.is_study:
+            small.append(Job(job.experiment, job.script, {"quick": True}))
+            continue
+        if job.steps:
+            default = SITE_SPECIFIC_STEPS if flags.get("mode") == "site-specific" else GENERALIST_STEPS
+            flags["total_timesteps"] = QUICK_STEPS * job.steps // default
+        flags |= QUICK_EVALUATION
+        if "preference" in flags:
+            del flags["eval_weights"]  # an agent of one weight is evaluated at it
+        flags["run_dir"] = runs_dir / f"{number:02d}-{job.script}"
+        small.append(Job(job.experiment, job.script, flags))
+    return small

@@ -1,0 +1,57 @@
+"""The three preference-conditioned methods and the fixed strategies: learning, evaluation, trade-offs."""
+
+import numpy as np
+
+from analysis.experiments import HEURISTICS, METHODS
+from analysis.figures.common import (
+    COLOURS,
+    MARKERS,
+    RETURNS,
+    SEEDS_95,
+    STEPS,
+    finish,
+    learning_curve,
+    mean_front,
+    methods,
+    panels,
+    wanting,
+    weight_points,
+)
+from analysis.results import TITLES
+
+SIZE = (7, 5.6)
+CAPTION = (f"Returns are sums over 50 years. (a) {SEEDS_95}. (b) thin bars: standard deviation over episodes, as in "
+           "the paper; dots: seeds. (c) a point a weight, mean over seeds. (d) large: mean over seeds, small: seeds.")
+
+
+def draw(figure, results) -> None:
+    """Learning curves, evaluation, trade-offs of all, the curriculum's trade-off."""
+    learning, bars, trade_offs, curriculum = panels(
+        figure, 2, 2, ["training", "evaluation", "trade-offs", "Curriculum PPO by weight"])  # fmt: skip
+    for script, title in methods(learning, results):
+        learning_curve(learning, results.of("main", script), "scalarized_return", COLOURS[script], title)
+    finish(learning, ylabel="scalarised return", **STEPS)
+
+    scripts = [script for script in (*METHODS, *HEURISTICS) if not wanting(bars, results, "main", script)]
+    for k, script in enumerate(scripts):
+        evaluations = [one.evaluation.scalarized_return for one in results.of("main", script)]
+        means = [values.mean() for values in evaluations]
+        bars.bar(k, np.mean(means), color=COLOURS[script], alpha=0.6)
+        spread = np.mean([values.std() for values in evaluations])
+        bars.errorbar(k, np.mean(means), spread, color="black", linewidth=0.6)
+        bars.plot(np.full(len(means), k), means, "o", color="black", markersize=2)
+    bars.set_xticks(range(len(scripts)), [TITLES[script] for script in scripts], rotation=40, ha="right")
+    bars.axhline(0, color="black", linewidth=0.5)
+    finish(bars, legend=False, ylabel="mean scalarised return")
+
+    for script in (*METHODS, *HEURISTICS):
+        if not wanting(trade_offs, results, "main", script):
+            front = mean_front(results.of("main", script))
+            trade_offs.plot(front.thaw_return, front.carbon_return, MARKERS[script], color=COLOURS[script],
+                            label=TITLES[script], markersize=5)  # fmt: skip
+    finish(trade_offs, legend_size=5.5, **RETURNS)
+
+    if not wanting(curriculum, results, "main", "ppo_curriculum"):
+        points = weight_points(curriculum, results.of("main", "ppo_curriculum"))
+        figure.colorbar(points, ax=curriculum, label="weight of carbon")
+    finish(curriculum, legend=False, **RETURNS)

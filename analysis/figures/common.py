@@ -1,0 +1,193 @@
+"""What all figures share: colours, letters, curves with bands, panels without data, files with the same bytes."""
+
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
+
+from analysis import metrics, protocol
+from analysis.experiments import METHODS
+from analysis.results import TITLES
+
+STYLE = {
+    "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "legend.fontsize": 7, "xtick.labelsize": 7,
+    "ytick.labelsize": 7, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
+    "lines.linewidth": 1.3, "axes.unicode_minus": True, "svg.hashsalt": "borearl", "pdf.fonttype": 42,
+}  # fmt: skip
+# Okabe and Ito (2008): told apart with every kind of colour vision; the markers tell them apart in grey.
+COLOURS = {
+    "eupg_var_lambda": "#CC79A7",
+    "ppo_gated": "#009E73",
+    "ppo_curriculum": "#D55E00",
+    "eupg_fixed_lambda": "#0072B2",
+    "zero_change": "#000000",
+    "plus_100": "#56B4E9",
+    "target_density": "#E69F00",
+    "conifer_restoration": "#0072B2",
+    "random_valid": "#999999",
+}
+MARKERS = {"eupg_var_lambda": "s", "ppo_gated": "^", "ppo_curriculum": "o", "eupg_fixed_lambda": "D",
+           "zero_change": "x", "plus_100": "+", "target_density": "v", "conifer_restoration": "*",
+           "random_valid": "1"}  # fmt: skip
+WEIGHT_COLOURS = "viridis"
+BINS = 40  # of a learning curve
+SEEDS_95 = "curves and bands: interquartile mean over training seeds and its 95 % interval (none with one seed)"
+
+
+def save(figure: Figure, stem: Path) -> None:
+    """stem.png and stem.pdf, without dates or versions: the same bytes from the same runs."""
+    with protocol.replacing(stem.with_suffix(".png")) as file:
+        figure.savefig(file, format="png", dpi=200, metadata={"Software": None})
+    with protocol.replacing(stem.with_suffix(".pdf")) as file:
+        figure.savefig(file, format="pdf", metadata={"Creator": None, "Producer": None, "CreationDate": None})
+
+
+def panels(figure: Figure, rows: int, columns: int, titles: list[str]) -> list:
+    """Axes with letters and titles, row by row."""
+    axes = list(figure.subplots(rows, columns, squeeze=False).flat)
+    letter(axes, titles)
+    return axes
+
+
+def letter(axes, titles) -> None:
+    """Title each panel with its letter."""
+    for k, (ax, title) in enumerate(zip(axes, titles, strict=True)):
+        ax.set_title(f"({'abcdefg'[k]}) {title}", loc="left")
+
+
+def no_data(ax, *commands: str) -> None:
+    """Say in an empty panel which command makes its data."""
+    lines = [line for command in commands for line in textwrap.wrap(command, 42, subsequent_indent="    ")]
+    ax.text(0.5, 0.5, "\n".join(["no run yet:", *lines]), transform=ax.transAxes, ha="center", va="center",
+            fontsize=6, family="monospace", wrap=True)  # fmt: skip
+    ax.set_xticks([])
+    ax.set_yticks([])
+
+
+def wanting(ax, results, experiment: str, script: str) -> bool:
+    """Whether a script has no finished run; then the panel, if still empty, says which command makes it."""
+    if results.of(experiment, script):
+        return False
+    job = results.first_job(experiment, script)
+    ax.wanted = [*getattr(ax, "wanted", []), job]
+    return True
+
+
+def finish(ax, legend: bool = True, legend_size: float = 7, **labels) -> None:
+    """Labels and legend of a panel; one that has drawn nothing names its commands, one that lacks some too."""
+    wanted = getattr(ax, "wanted", [])
+    if not ax.has_data():
+        no_data(ax, *(job.command for job in wanted))
+        return
+    ax.set(**labels)
+    for axis, most in ((ax.xaxis, 4), (ax.yaxis, 5)):
+        if isinstance(axis.get_major_formatter(), ScalarFormatter):
+            axis.set_major_locator(MaxNLocator(most))
+            axis.get_major_formatter().set_useOffset(False)
+    if wanted:
+        experiments = " ".join(dict.fromkeys(job.experiment for job in wanted))
+        note = [*textwrap.wrap("no run yet: " + ", ".join(job.script for job in wanted), 60),
+                f"(python analysis/reproduce.py --only {experiments})"]  # fmt: skip
+        ax.text(0.99, 0.01, "\n".join(note), transform=ax.transAxes, ha="right", va="bottom", fontsize=5)
+    if legend:
+        ax.legend(fontsize=legend_size)
+
+
+# ------------------------------------------------------------------------------------------------- curves
+
+
+def band(ax, x, curves, colour, label, style="-", marker=None) -> None:
+    """Interquartile mean of curves (seeds, points) and its 95 % bootstrap interval over the seeds."""
+    middle, low, high = metrics.bootstrap_band(curves)
+    ax.plot(x, middle, style, color=colour, label=label, marker=marker, markersize=3)
+    if len(curves) > 1:
+        ax.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0)
+
+
+def binned(episodes: pd.DataFrame, column: str, steps: int, statistic: str = "mean", bins: int = BINS) -> np.ndarray:
+    """A statistic of the training episodes that ended in each of equal parts of the training, (bins,)."""
+    number = np.minimum((episodes.global_step - 1) * bins // steps, bins - 1)
+    return episodes[column].groupby(number).agg(statistic).reindex(range(bins)).to_numpy()
+
+
+def learning_curve(ax, replicates, column: str, colour, label: str, statistic="mean", marker=None) -> None:
+    """A column of the training episodes against environment steps; one run a replicate."""
+    runs = [one.runs[0] for one in replicates]
+    steps = max(run.arguments["total_timesteps"] for run in runs)
+    curves = np.array([binned(run.episodes, column, steps, statistic) for run in runs])
+    known = ~np.isnan(curves).any(axis=0)
+    x = (np.arange(BINS) + 0.5) * steps / BINS / 1000
+    band(ax, x[known], curves[:, known], colour, label, marker=marker)
+
+
+def by_year(replicates, variable: str) -> np.ndarray:
+    """A column of the annual record, averaged over the kept weights, (replicates, years)."""
+    def of_one(one):
+        years = one.years([variable])
+        return years.groupby("year")["mean"].mean().to_numpy()
+
+    return np.array([of_one(one) for one in replicates])
+
+
+def year_curve(ax, replicates, variable: str, colour, label: str, style="-") -> None:
+    """A column of the annual record against the year."""
+    curves = by_year(replicates, variable)
+    band(ax, np.arange(1, curves.shape[1] + 1), curves, colour, label, style)
+
+
+def by_season(replicates, bins: int = 8) -> tuple[np.ndarray, np.ndarray]:
+    """Thaw return against growing season: means in bins with equally many episodes, (points), (replicates, points)."""
+    def of_one(one):
+        groups = pd.qcut(one.evaluation.growing_season_days, bins, labels=False, duplicates="drop")
+        return one.evaluation.groupby(groups)[["growing_season_days", "thaw_return"]].mean()
+
+    tables = [of_one(one) for one in replicates]
+    return tables[0].growing_season_days.to_numpy(), np.array([table.thaw_return for table in tables])
+
+
+def season_curves(ax, results) -> None:
+    """Growing season against thaw return for every method."""
+    for script, title in methods(ax, results):
+        band(ax, *by_season(results.of("main", script)), COLOURS[script], title, marker=MARKERS[script])
+    finish(ax, xlabel="days above 5 °C", ylabel="thaw return (50 years)")
+
+
+# ---------------------------------------------------------------------------------------------- trade-offs
+
+
+def methods(ax, results):
+    """(script, title) of the preference-conditioned methods that have runs; the others' commands are noted."""
+    for script in METHODS:
+        if not wanting(ax, results, "main", script):
+            yield script, TITLES[script]
+
+
+def mean_front(replicates) -> pd.DataFrame:
+    """Mean returns by weight, averaged over replicates."""
+    tables = [metrics.mean_returns(one.evaluation) for one in replicates]
+    return pd.concat(tables).groupby(level=0).mean()
+
+
+def weight_points(ax, replicates, marker="o"):
+    """Every seed's mean returns at each weight, small, and their mean, large, coloured by the weight."""
+    for one in replicates if len(replicates) > 1 else ():
+        front = metrics.mean_returns(one.evaluation)
+        ax.scatter(front.thaw_return, front.carbon_return, c=front.index, cmap=WEIGHT_COLOURS, vmin=0, vmax=1, s=5,
+                   alpha=0.5, linewidths=0)  # fmt: skip
+    front = mean_front(replicates)
+    best = front[[tuple(point) in set(map(tuple, metrics.nondominated(front))) for point in front.to_numpy()]]
+    best = best.sort_values("thaw_return")
+    ax.plot(best.thaw_return, best.carbon_return, color="#888888", linewidth=0.8, zorder=1)
+    points = ax.scatter(front.thaw_return, front.carbon_return, c=front.index, cmap=WEIGHT_COLOURS, vmin=0, vmax=1,
+                        s=28, marker=marker, edgecolors="black", linewidths=0.5)  # fmt: skip
+    for weight in (front.index[0], front.index[-1]):
+        ax.annotate(f"{weight:g}", front.loc[weight, ["thaw_return", "carbon_return"]], xytext=(4, 4),
+                    textcoords="offset points", fontsize=6)  # fmt: skip
+    return points
+
+
+RETURNS = {"xlabel": "thaw return (50 years)", "ylabel": "carbon return (50 years)"}
+STEPS = {"xlabel": "environment steps (thousands)"}

@@ -1,0 +1,34 @@
+"""Carbon and thaw apart, in training and in evaluation."""
+
+import numpy as np
+
+from analysis import metrics
+from analysis.figures.common import (
+    COLOURS,
+    MARKERS,
+    SEEDS_95,
+    STEPS,
+    band,
+    finish,
+    learning_curve,
+    methods,
+    panels,
+)
+
+SIZE = (7, 5.2)
+CAPTION = f"Returns are sums over 50 years; {SEEDS_95}. (c, d) means over 100 episodes."
+OBJECTIVES = {"carbon_return": "carbon return", "thaw_return": "thaw return"}
+
+
+def draw(figure, results) -> None:
+    """Learning curves of both, then both by weight."""
+    axes = panels(figure, 2, 2, ["carbon, training", "thaw, training", "carbon, evaluation", "thaw, evaluation"])
+    for ax, (column, label) in zip(axes[:2], OBJECTIVES.items(), strict=True):
+        for script, title in methods(ax, results):
+            learning_curve(ax, results.of("main", script), column, COLOURS[script], title)
+        finish(ax, ylabel=label, **STEPS)
+    for ax, (column, label) in zip(axes[2:], OBJECTIVES.items(), strict=True):
+        for script, title in methods(ax, results):
+            fronts = [metrics.mean_returns(one.evaluation)[column] for one in results.of("main", script)]
+            band(ax, fronts[0].index, np.array(fronts), COLOURS[script], title, marker=MARKERS[script])
+        finish(ax, xlabel="weight of carbon", ylabel=label)

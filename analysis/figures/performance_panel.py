@@ -1,0 +1,52 @@
+"""Both objectives in training and evaluation, the growing season, and the stands' ages."""
+
+import numpy as np
+
+from analysis.figures.common import (
+    COLOURS,
+    MARKERS,
+    RETURNS,
+    SEEDS_95,
+    binned,
+    by_year,
+    finish,
+    mean_front,
+    methods,
+    panels,
+    season_curves,
+)
+
+SIZE = (7, 5.4)
+CAPTION = ("(a) mean over the seeds in eighths of the training, the mark is the last. (b) a point a weight. "
+           f"(c) {SEEDS_95}. (d) mean over the weights 0, 0.5 and 1 and seeds; bars: sd over seeds.")  # fmt: skip
+PARTS = 8  # of the training
+CLASSES = ("seedling", "sapling", "young", "mature", "old")
+
+
+def draw(figure, results) -> None:
+    """Carbon against thaw twice, growing season, demographics."""
+    training, evaluation, season, ages = panels(
+        figure, 2, 2, ["training", "evaluation", "growing season and thaw", "ages after 50 years"])  # fmt: skip
+    for script, title in methods(training, results):
+        runs = [one.runs[0] for one in results.of("main", script)]
+        steps = max(run.arguments["total_timesteps"] for run in runs)
+        thaw, carbon = (np.mean([binned(run.episodes, name, steps, bins=PARTS) for run in runs], axis=0)
+                        for name in ("thaw_return", "carbon_return"))  # fmt: skip
+        known = np.flatnonzero(~np.isnan(thaw))
+        training.plot(thaw[known], carbon[known], color=COLOURS[script], linewidth=0.7, alpha=0.6)
+        training.plot(thaw[known[-1]], carbon[known[-1]], MARKERS[script], color=COLOURS[script], label=title)
+    finish(training, **RETURNS)
+    for script, title in methods(evaluation, results):
+        front = mean_front(results.of("main", script))
+        evaluation.plot(front.thaw_return, front.carbon_return, MARKERS[script], color=COLOURS[script], label=title)
+    finish(evaluation, **RETURNS)
+    season_curves(season, results)
+    for k, (script, title) in enumerate(methods(ages, results)):
+        stems = np.array([sum(by_year(results.of("main", script), f"{species}_{age}_stems_ha")[:, -1]
+                              for species in ("conifer", "deciduous")) for age in CLASSES])  # fmt: skip
+        ages.bar(np.arange(len(CLASSES)) + 0.27 * (k - 1), stems.mean(axis=1), 0.25, yerr=stems.std(axis=1),
+                 color=COLOURS[script], label=title, error_kw={"linewidth": 0.6})  # fmt: skip
+    ages.set_xticks(range(len(CLASSES)), CLASSES)
+    finish(ages, ylabel="stems/ha")
+
+

@@ -1,0 +1,24 @@
+"""How far the site decides about thaw, and how much the returns of training episodes scatter for it."""
+
+import sim
+from analysis import open_loop
+from analysis.figures.common import COLOURS, MARKERS, SEEDS_95, STEPS, finish, learning_curve, methods, panels
+
+SIZE = (7, 3)
+CAPTION = f"(a) evaluation, a point a site, mean over weights and seeds. (b) {SEEDS_95}."
+
+
+def draw(figure, results) -> None:
+    """Thaw return against the site's boundary less its air; scatter of thaw returns in training."""
+    sites, volatility = panels(figure, 1, 2, ["thaw by site", "scatter of thaw returns in training"])
+    for script, title in methods(sites, results):
+        evaluations = [one.evaluation.groupby("site_seed").thaw_return.mean() for one in results.of("main", script)]
+        thaw = sum(evaluations) / len(evaluations)
+        features = [open_loop.site_features(sim.sample_site(int(seed))) for seed in thaw.index]
+        x = [feature["boundary_above_air_k"] for feature in features]
+        sites.plot(x, thaw, MARKERS[script], color=COLOURS[script], label=title, markersize=3, alpha=0.7,
+                   markerfacecolor="none")  # fmt: skip
+    finish(sites, xlabel="temperature at 12 m less mean annual air (K)", ylabel="thaw return (50 years)")
+    for script, title in methods(volatility, results):
+        learning_curve(volatility, results.of("main", script), "thaw_return", COLOURS[script], title, "std")
+    finish(volatility, ylabel="standard deviation of thaw returns", **STEPS)

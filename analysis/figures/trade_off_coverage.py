@@ -1,0 +1,21 @@
+"""The trade-offs that each method covers, a point a weight."""
+
+from analysis.figures.common import RETURNS, finish, panels, wanting, weight_points
+from analysis.results import TITLES
+
+SIZE = (7, 5.4)
+CAPTION = ("Evaluation, means over 100 episodes, sums over 50 years. Large: mean over seeds; small: seeds; line: the "
+           "points that none dominates.")  # fmt: skip
+PANELS = {"eupg_fixed_lambda": "fixed", "eupg_var_lambda": "main", "ppo_gated": "main", "ppo_curriculum": "main"}
+
+
+def draw(figure, results) -> None:
+    """A panel a method."""
+    axes = panels(figure, 2, 2, [TITLES[script] for script in PANELS])
+    points = None
+    for ax, (script, experiment) in zip(axes, PANELS.items(), strict=True):
+        if not wanting(ax, results, experiment, script):
+            points = weight_points(ax, results.of(experiment, script))
+        finish(ax, legend=False, **RETURNS)
+    if points is not None:
+        figure.colorbar(points, ax=axes, label="weight of carbon", shrink=0.7)

@@ -1,0 +1,16 @@
+"""What the methods do with stands while they train."""
+
+from analysis.figures.common import COLOURS, SEEDS_95, STEPS, finish, learning_curve, methods, panels
+
+SIZE = (7, 2.9)
+CAPTION = f"Training episodes; {SEEDS_95}."
+
+
+def draw(figure, results) -> None:
+    """Species and density, each the mean over an episode's 50 years."""
+    species, density = panels(figure, 1, 2, ["species", "stem density"])
+    for ax, column, label in ((species, "mean_conifer_fraction", "conifer fraction, mean of 50 years"),
+                              (density, "mean_density", "stems/ha, mean of 50 years")):  # fmt: skip
+        for script, title in methods(ax, results):
+            learning_curve(ax, results.of("main", script), column, COLOURS[script], title)
+        finish(ax, ylabel=label, **STEPS)

@@ -1,0 +1,78 @@
+"""Draws the paper's figures from the runs that exist: results/figures/*.png and *.pdf.
+
+    python analysis/make_figures.py [--runs-dir runs results/runs] [--figures-dir results/figures]
+
+A panel without runs says which command makes them.
+"""
+
+import sys
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from analysis import protocol
+from analysis.figures import (
+    algorithm_comparison,
+    demographics,
+    individual_objectives,
+    learning_asymmetry,
+    performance_panel,
+    site_influence,
+    strategies,
+    trade_off_coverage,
+    training_dynamics,
+)
+from analysis.figures.common import STYLE, save
+from analysis.make_tables import name_of
+from analysis.results import Results
+
+FIGURES = (learning_asymmetry, algorithm_comparison, strategies, site_influence, trade_off_coverage,
+           training_dynamics, performance_panel, individual_objectives, demographics)  # fmt: skip
+
+
+@dataclass
+class Args:
+    """Draws the figures from the runs that exist."""
+
+    runs_dir: tuple[Path, ...] | None = None
+    """folders that hold the runs, at any depth (None: results/runs and runs)"""
+    figures_dir: Path | None = None
+    """folder for the figures (None: results/figures, or results/quick/figures)"""
+    quick: bool = False
+    """from the runs of `reproduce.py --quick`"""
+
+
+def draw(module, results: Results) -> Figure:
+    """One figure, its caption below."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=module.SIZE, layout="constrained")
+        module.draw(figure, results)
+        figure.supxlabel(textwrap.fill(module.CAPTION, 140), fontsize=6)
+    return figure
+
+
+def main(args: Args) -> None:
+    """Draw every figure; name what was left out."""
+    results = Results.load(args.quick, args.runs_dir)
+    if not any(results.rows.values()):
+        where = ", ".join(map(str, results.roots))
+        sys.exit(f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, the first is\n"
+                 f"  {results.jobs[0].command}")  # fmt: skip
+    for line in results.left_out:
+        print(f"left out: {line}", file=sys.stderr)
+    folder = args.figures_dir or Path("results/quick/figures" if args.quick else "results/figures")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for module in FIGURES:
+            with matplotlib.rc_context(STYLE):
+                save(draw(module, results), folder / name_of(module))
+    except OSError as error:
+        sys.exit(f"error: --figures-dir {folder}: cannot write there ({error.strerror})")
+    print(f"{len(FIGURES)} figures: {folder}/*.png, *.pdf")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

@@ -1,0 +1,111 @@
+"""Pairs of stands that differ in one thing, on the same sites and weathers: what it does to both objectives.
+
+    python analysis/mechanism_pairs.py
+
+Where the paper correlates across sites, which differ in everything at once, here all but one thing is equal. Stands
+begin with 1000 stems/ha, half of them conifers, and are left alone for 50 years, except in the pairs of planting.
+Leaves results/studies/mechanism_pairs.csv, one row a pair and site.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+import boreal_env
+import sim
+from analysis import open_loop, protocol, results, stored
+
+YEARS = 50
+STAND = {"density_stems_ha": 1000.0, "conifer_fraction": 0.5, "biomass_kgc_m2": 5.0, "soil_kgc_m2": 6.0,
+         "oldest_age_years": 80.0}  # fmt: skip
+PLANT_DECIDUOUS, PLANT_HALF, PLANT_CONIFER = 20, 22, 24
+
+#: Name -> (lower, upper): each a change of the site (name -> function of its value), the first stand, and the action.
+PAIRS = {
+    "growing season of leaves, 40 days longer": (
+        ({"growth_start_day": lambda day: day + 10, "fall_start_day": lambda day: day - 10}, {}, boreal_env.NO_CHANGE),
+        ({"growth_start_day": lambda day: day - 10, "fall_start_day": lambda day: day + 10}, {}, boreal_env.NO_CHANGE),
+    ),
+    "growing season by a climate 1 K warmer": (
+        ({"mean_annual_temperature_c": lambda t: t - 0.5}, {}, boreal_env.NO_CHANGE),
+        ({"mean_annual_temperature_c": lambda t: t + 0.5}, {}, boreal_env.NO_CHANGE),
+    ),
+    "stem density, 500 to 1500 stems/ha": (
+        ({}, {"density_stems_ha": 500.0, "biomass_kgc_m2": 2.5}, boreal_env.NO_CHANGE),
+        ({}, {"density_stems_ha": 1500.0, "biomass_kgc_m2": 7.5}, boreal_env.NO_CHANGE),
+    ),
+    "conifer fraction, 0.2 to 0.8": (
+        ({}, {"conifer_fraction": 0.2}, boreal_env.NO_CHANGE),
+        ({}, {"conifer_fraction": 0.8}, boreal_env.NO_CHANGE),
+    ),
+    "LAI, 20 % less to 20 % more": (
+        ({"max_lai_conifer": lambda lai: 0.8 * lai, "max_lai_deciduous": lambda lai: 0.8 * lai}, {},
+         boreal_env.NO_CHANGE),
+        ({"max_lai_conifer": lambda lai: 1.2 * lai, "max_lai_deciduous": lambda lai: 1.2 * lai}, {},
+         boreal_env.NO_CHANGE),
+    ),
+    "planting, none to 100 a year of 300 stems/ha": (
+        ({}, {"density_stems_ha": 300.0, "biomass_kgc_m2": 1.5}, boreal_env.NO_CHANGE),
+        ({}, {"density_stems_ha": 300.0, "biomass_kgc_m2": 1.5}, PLANT_HALF),
+    ),
+    "planting 100 a year of 300 stems/ha, deciduous to conifers": (
+        ({}, {"density_stems_ha": 300.0, "biomass_kgc_m2": 1.5}, PLANT_DECIDUOUS),
+        ({}, {"density_stems_ha": 300.0, "biomass_kgc_m2": 1.5}, PLANT_CONIFER),
+    ),
+}  # fmt: skip
+MEANS = ("growing_season_days", "max_lai", "latent_heat_mj_m2", "ground_shortwave_mj_m2", "boundary_warming_mj_m2",
+         "boundary_cooling_mj_m2", "peak_swe_mm", "winter_albedo", "net_carbon_change_kgc_m2")  # fmt: skip
+
+
+@dataclass
+class Args:
+    """Plays pairs of stands that differ in one thing."""
+
+    sites: int = 48
+    """sampled sites, each with one weather"""
+    quick: bool = False
+    """2 sites and 5 years, into results/quick/studies"""
+
+
+def play(change: dict, stand: dict, action: int, sites: int, years: int) -> pd.DataFrame:
+    """One side of a pair on every site: both returns, and means over the years of MEANS."""
+    numbers = range(sites)
+    seeds = [open_loop.seeds(open_loop.FIRST_SITE_SEED + k, k) for k in numbers]
+    sampled = [sim.sample_site(open_loop.FIRST_SITE_SEED + k) for k in numbers]
+    changed = [site | {name: function(site[name]) for name, function in change.items()} for site in sampled]
+    plans = np.full((sites, years), action)
+    episodes = open_loop.play(changed, seeds, plans, initial={k: STAND | stand for k in numbers})
+    table = pd.DataFrame(episodes.returns(), columns=["carbon_return", "thaw_return"])
+    return table.assign(**{name: episodes.total(name) / years for name in MEANS})
+
+
+def study(sites: int, years: int) -> pd.DataFrame:
+    """One row a pair and site: values of the lower and the upper side."""
+    tables = []
+    progress = protocol.Progress("pairs", 2 * len(PAIRS) * sites, "episodes")
+    for number, (pair, sides) in enumerate(PAIRS.items()):
+        lower, upper = (play(*side, sites, years) for side in sides)
+        table = lower.add_prefix("lower_").join(upper.add_prefix("upper_"))
+        table.insert(0, "pair", pair)
+        table.insert(1, "site_seed", open_loop.FIRST_SITE_SEED + np.arange(sites))
+        tables.append(table)
+        progress.show(2 * (number + 1) * sites)
+    return pd.concat(tables, ignore_index=True)
+
+
+def main(args: Args) -> None:
+    """Play all pairs, unless the table is there."""
+    sites, years = (2, 5) if args.quick else (args.sites, YEARS)
+    folder = results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR
+    path = folder / "mechanism_pairs.csv"
+    settings = {"sites": sites, "years": years, "pairs": list(PAIRS), "physics": open_loop.fingerprint()}
+    if stored.is_finished(path, settings):
+        print(f"{path} is finished")
+        return
+    stored.write(path, study(sites, years), settings)
+    print(f"wrote {path}")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

@@ -1,0 +1,136 @@
+"""What tables and figures are made of: the runs that exist, sorted into the experiments' rows, and the studies."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import pandas as pd
+
+from analysis import experiments, metrics, runs, stored
+
+STUDIES_DIR = Path("results/studies")
+QUICK_STUDIES_DIR = Path("results/quick/studies")
+
+#: Our scripts, and what the paper's tables call them (None: it has no such row).
+METHODS = {
+    "ppo_curriculum": "curriculum_ppo",
+    "ppo_gated": "ppo_gated",
+    "eupg_var_lambda": "eupg_variable_lambda",
+    "eupg_fixed_lambda": "fixed_weight_eupg",
+    "target_density": "target_density",
+    "conifer_restoration": "conifer_restoration",
+    "zero_change": "zero_density_change",
+    "plus_100": "plus_100_density",
+    "random_valid": None,
+}
+TITLES = {
+    "ppo_curriculum": "Curriculum PPO",
+    "ppo_gated": "PPO Gated",
+    "eupg_var_lambda": "Variable λ EUPG",
+    "eupg_fixed_lambda": "Fixed λ EUPG",
+    "target_density": "Target density 1000",
+    "conifer_restoration": "Conifer restoration",
+    "zero_change": "Zero change",
+    "plus_100": "+100 a year",
+    "random_valid": "Random",
+}
+
+
+@dataclass(frozen=True)
+class Replicate:
+    """One training seed of a row: a run, or the runs of one agent a weight, evaluated each at its own."""
+
+    runs: list[runs.Run]
+    evaluation: pd.DataFrame
+    gains: pd.DataFrame | None  # the evaluation less zero change on the same episodes, if that was evaluated
+
+    def each_run(self) -> list["Replicate"]:
+        """Its runs, each a replicate of its own."""
+        return [Replicate([run], run.evaluation, None) for run in self.runs]
+
+    def years(self, variables: list[str] | None = None) -> pd.DataFrame:
+        """Annual record of the sampled policy: means over the episodes, of the weights that are kept."""
+        table = pd.concat([run.years for run in self.runs if run.years is not None], ignore_index=True)
+        return table if variables is None else table[table.variable.isin(variables)]
+
+
+class Results:
+    """Runs below some folders by row, and the tables of the studies.
+
+    `left_out` has a line for each run that could not be used, `missing` the jobs that have no run.
+    """
+
+    def __init__(self, roots: tuple[Path, ...], jobs: list[experiments.Job], studies_dir: Path):
+        self.roots, self.jobs, self.studies_dir = roots, jobs, studies_dir
+        self.runs, self.left_out = runs.read_runs(*roots)
+        self.missing = [job for job in jobs if not job.is_study
+                        and not any(job.made(run.config) for run in self.runs)]  # fmt: skip
+
+    @staticmethod
+    def load(quick: bool, roots: tuple[Path, ...] | None = None) -> "Results":
+        """The results of `reproduce.py`, or of `reproduce.py --quick`.
+
+        The archive comes before the runs themselves, so that a clone's tables have the same digits.
+        """
+        if quick:
+            default = experiments.QUICK_ARCHIVE_DIR, experiments.QUICK_DIR
+            return Results(roots or default, experiments.quick_jobs(), QUICK_STUDIES_DIR)
+        return Results(roots or (runs.ARCHIVE_DIR, runs.RUNS_DIR), experiments.jobs(), STUDIES_DIR)
+
+    @cached_property
+    def rows(self) -> dict[tuple, list[Replicate]]:
+        """(script, environment, setting) -> replicates; the rows of the experiments first, without runs if need be."""
+        rows = {job.row: {} for job in self.jobs if not job.is_study}
+        for run in self.runs:
+            row = rows.setdefault((run.script, run.arguments["env_id"], run.setting), {})
+            row.setdefault((run.arguments["seed"], run.arguments["site_seed"]), []).append(run)
+        return {key: [self._replicate(*item) for item in sorted(row.items(), key=str) if self._complete(key, *item)]
+                for key, row in rows.items()}  # fmt: skip
+
+    def _complete(self, key, replicate, its_runs) -> bool:
+        """Whether one agent a weight is there for every weight of the experiment; if not, it is named."""
+        wanted = {job.flags["preference"] for job in self.jobs if job.row == key and "preference" in job.flags}
+        lacking = wanted - {run.arguments.get("preference") for run in its_runs}
+        if lacking:
+            seed, site_seed = replicate
+            site = "" if site_seed is None else f", site seed {site_seed}"
+            self.left_out.append(f"{key[0]}, {key[1]}, seed {seed}{site}: partial, without the agents of the weights "
+                                 f"{', '.join(f'{weight:g}' for weight in sorted(lacking))}")  # fmt: skip
+        return not lacking
+
+    def _replicate(self, _, its_runs) -> Replicate:
+        evaluation = pd.concat([run.evaluation for run in its_runs], ignore_index=True)
+        conditions = {name: its_runs[0].arguments[name] for name in ("env_id", "thaw_formulation", "site_seed")}
+        return Replicate(its_runs, evaluation, self.gains(evaluation, **conditions))
+
+    def gains(self, evaluation, env_id, thaw_formulation="asymmetric", site_seed=None) -> pd.DataFrame | None:
+        """An evaluation less zero change under the same reward; None if that was not evaluated on its episodes."""
+        conditions = {"env_id": env_id, "thaw_formulation": thaw_formulation, "site_seed": site_seed}
+        same = [run.evaluation for run in self.runs if run.script == "zero_change"
+                and all(run.arguments[name] == value for name, value in conditions.items())]  # fmt: skip
+        longest = max(same, key=len, default=None)
+        known = longest is not None and set(evaluation.seed) <= set(longest.seed)
+        return metrics.gains(evaluation, longest) if known else None
+
+    def of(self, experiment: str, script: str, **flags) -> list[Replicate]:
+        """Replicates of an experiment's row: the first of its jobs with these flags says which."""
+        job = next(job for job in self.jobs if job.experiment == experiment and job.script == script
+                   and all(job.flags.get(name) == value for name, value in flags.items()))  # fmt: skip
+        return self.rows[job.row]
+
+    def expected(self, key: tuple) -> int:
+        """Replicates that the experiments have of a row."""
+        return len({(job.flags.get("seed", 1), job.flags.get("site_seed")) for job in self.jobs if job.row == key})
+
+    def is_papers(self, key: tuple) -> bool:
+        """Whether a row is one of the paper's: no control, and not of the balanced environment."""
+        return key[2] == "default" or any(job.row == key for job in self.jobs if job.experiment in ("main", "fixed"))
+
+    def first_job(self, experiment: str, script: str) -> experiments.Job:
+        """The first job of an experiment's script."""
+        return next(job for job in self.jobs if job.experiment == experiment and job.script == script)
+
+    def study(self, name: str) -> pd.DataFrame | None:
+        """The table of a study; None if it has not been made."""
+        path = self.studies_dir / f"{name}.csv"
+        return stored.read(path) if path.exists() else None

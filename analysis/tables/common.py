@@ -1,0 +1,78 @@
+"""What all tables share: statistics over training seeds, cells with intervals, three formats."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis import metrics, protocol
+from analysis.protocol import FLOAT_FORMAT
+
+PAPER_TABLES = Path(__file__).parents[1] / "paper_tables"
+GENERALIST = "boreal-generalist-v0"
+#: The first columns of a table with a row for each method.
+ROW_COLUMNS = {"method": "method", "environment": "environment", "setting": "setting", "seeds": "seeds"}
+
+
+def paper(name: str, **arguments) -> pd.DataFrame:
+    """A table of the paper."""
+    return pd.read_csv(PAPER_TABLES / f"{name}.csv", **arguments)
+
+
+def row_of(key: tuple, number: int) -> dict:
+    """The columns that name a row, with the number of its training seeds."""
+    return dict(zip(("method", "environment", "setting"), key, strict=True)) | {"seeds": number}
+
+
+def over_seeds(values: pd.DataFrame) -> dict:
+    """Interquartile mean of each column over training seeds (rows), with its 95 % bootstrap interval."""
+    row = {}
+    for name in values:
+        known = values[name].dropna().to_numpy(dtype=float)
+        row[name] = metrics.iqm(known) if len(known) else np.nan
+        row[f"{name}_low"], row[f"{name}_high"] = metrics.bootstrap_interval(known)
+    return row
+
+
+def mean_of_years(replicate, variables: list[str]) -> dict:
+    """Mean over the years and the kept weights of columns of the annual record, sampled policy."""
+    table = replicate.years(variables)
+    return table.groupby("variable")["mean"].mean().to_dict()
+
+
+def cell(row: pd.Series, name: str) -> str:
+    """A value as text; a number with its 95 % interval, if there is one."""
+    value, low, high = (row.get(key, np.nan) for key in (name, f"{name}_low", f"{name}_high"))
+    if isinstance(value, str):
+        return value
+    if pd.isna(value):
+        return ""
+    return f"{value:.4g}" if pd.isna(low) else f"{value:.4g} [{low:.4g}, {high:.4g}]"
+
+
+def readable(table: pd.DataFrame, columns: dict[str, str]) -> pd.DataFrame:
+    """The table's chosen columns as text: name -> heading. A row without runs says so in the cell after `seeds`.
+
+    (Not in a table by weights, where the paper's weights are rows too.)
+    """
+    cells = [[cell(row, name) for name in columns] for _, row in table.iterrows()]
+    text = pd.DataFrame(cells, columns=list(columns.values()))
+    if "seeds" in table and "weight" not in table:
+        text.iloc[(table.seeds == 0).to_numpy().nonzero()[0], list(columns).index("seeds") + 1] = "no run yet"
+    return text
+
+
+def write_table(stem: Path, table: pd.DataFrame, text: pd.DataFrame) -> None:
+    """stem.csv with all numbers; stem.md and stem.tex (booktabs) with the readable columns."""
+    with protocol.replacing(stem.with_suffix(".csv")) as file:
+        table.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+    lines = [text.columns, ["---"] * text.shape[1], *text.to_numpy()]
+    markdown = "".join("| " + " | ".join(line) + " |\n" for line in lines)
+    with protocol.replacing(stem.with_suffix(".md")) as file:
+        file.write(markdown.encode())
+    head, *body = [" & ".join(line).replace("_", r"\_").replace("%", r"\%") + r" \\"
+                   for line in (text.columns, *text.to_numpy())]  # fmt: skip
+    latex = [rf"\begin{{tabular}}{{{'l' * text.shape[1]}}}", r"\toprule", head, r"\midrule", *body,
+             r"\bottomrule", r"\end{tabular}"]  # fmt: skip
+    with protocol.replacing(stem.with_suffix(".tex")) as file:
+        file.write(("\n".join(latex) + "\n").encode())

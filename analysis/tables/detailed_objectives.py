@@ -1,0 +1,53 @@
+"""Both objectives at every weight, and their gains over zero change on the same episodes."""
+
+import pandas as pd
+
+from analysis import metrics
+from analysis.results import METHODS
+from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
+
+TITLE = "Detailed objectives"
+COLUMNS = ROW_COLUMNS | {
+    "weight": "weight",
+    "carbon_return": "carbon",
+    "carbon_sd_over_episodes": "sd over episodes, carbon",
+    "paper_carbon_mean": "carbon (paper)",
+    "paper_carbon_std": "sd (paper), carbon",
+    "thaw_return": "thaw",
+    "thaw_sd_over_episodes": "sd over episodes, thaw",
+    "paper_thaw_mean": "thaw (paper)",
+    "paper_thaw_std": "sd (paper), thaw",
+    "carbon_gain": "carbon gain",
+    "thaw_gain": "thaw gain",
+}
+
+
+def by_weight(one) -> pd.DataFrame:
+    """Means of one run, a row per weight."""
+    spread = one.evaluation.groupby("preference")[metrics.OBJECTIVES].std()
+    table = metrics.mean_returns(one.evaluation).join(
+        spread.rename(columns=lambda name: name.replace("return", "sd_over_episodes")))  # fmt: skip
+    if one.gains is not None:
+        gains = metrics.mean_returns(one.gains)
+        table = table.join(gains.rename(columns=lambda name: name.replace("return", "gain")))
+    return table
+
+
+def make(results) -> pd.DataFrame:
+    """One row per script, environment, setting and weight; the paper's weights too where ours are others."""
+    published = paper("detailed_objectives", index_col=["method", "lambda_carbon"]).add_prefix("paper_")
+    rows = []
+    for key, replicates in results.rows.items():
+        tables = [by_weight(one) for one in replicates]
+        name = METHODS.get(key[0])
+        is_papers = results.is_papers(key) and key[1] == GENERALIST and (name, 0.0) in published.index
+        theirs = published.loc[name] if is_papers else published.iloc[:0]
+        ours = pd.concat(tables) if tables else pd.DataFrame()
+        for weight in sorted({*ours.index, *(theirs.index if tables else ())}):
+            at_weight = ours[ours.index == weight]
+            row = row_of(key, len(at_weight)) | {"weight": weight}
+            if len(at_weight):
+                spreads = [column for column in at_weight if "sd_over" in column]
+                row |= over_seeds(at_weight.drop(columns=spreads)) | at_weight[spreads].mean().to_dict()
+            rows.append(row | (theirs.loc[weight].to_dict() if weight in theirs.index else {}))
+    return pd.DataFrame(rows, columns=None if rows else list(COLUMNS))

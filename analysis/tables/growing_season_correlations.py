@@ -1,0 +1,63 @@
+"""Growing season against thaw return, latent heat and shortwave on the ground: correlations, and pairs of stands.
+
+The correlations are over evaluation episodes and weights, as the paper's: sites differ in everything at once. The
+pairs (analysis/mechanism_pairs.py) differ in the season alone.
+"""
+
+import pandas as pd
+
+from analysis import metrics
+from analysis.experiments import METHODS
+from analysis.tables.common import over_seeds, paper
+
+TITLE = "Growing-season correlations"
+VARIABLES = {"thaw_return": "thaw_reward", "latent_heat_mj_m2": "latent_heat",
+             "ground_shortwave_mj_m2": "ground_radiation"}  # fmt: skip
+SEASON_PAIRS = {"leaves": "growing season of leaves, 40 days longer",
+                "climate": "growing season by a climate 1 K warmer"}  # fmt: skip
+COLUMNS = {
+    "method": "method",
+    "variable": "variable",
+    "seeds": "seeds",
+    "r": "r",
+    "paper_r": "r (paper, all methods)",
+    "r_gain": "r of the gain",
+    "leaves_effect": "pairs: leaves 40 days longer",
+    "climate_effect": "pairs: climate 1 K warmer",
+}
+
+
+def correlations(one) -> dict:
+    """r of the growing season with each variable, and with the gain in thaw over zero change."""
+    season = one.evaluation.growing_season_days
+    row = {name: season.corr(one.evaluation[name]) for name in VARIABLES}
+    gain = None if one.gains is None else season.corr(one.gains.thaw_return)
+    return row | {"r_gain": gain}
+
+
+def pair_effects(pairs: pd.DataFrame | None, variable: str) -> dict:
+    """Mean effect of a longer season over the sites, upper less lower, with its 95 % interval."""
+    row = {}
+    for name, pair in SEASON_PAIRS.items() if pairs is not None else ():
+        sites = pairs[pairs.pair == pair]
+        mean, half_width = metrics.mean_interval(sites[f"upper_{variable}"] - sites[f"lower_{variable}"])
+        row |= {f"{name}_effect": mean, f"{name}_effect_low": mean - half_width,
+                f"{name}_effect_high": mean + half_width}  # fmt: skip
+    return row
+
+
+def make(results) -> pd.DataFrame:
+    """One row per method and variable."""
+    published = paper("growing_season_correlations", index_col="variable").r
+    pairs = results.study("mechanism_pairs")
+    rows = []
+    for script in ("zero_change", *METHODS):
+        replicates = results.of("main", script)
+        table = pd.DataFrame([correlations(one) for one in replicates], columns=[*VARIABLES, "r_gain"]).astype(float)
+        for variable, its_name in VARIABLES.items():
+            chosen = table[[variable]].set_axis(["r"], axis=1)
+            if variable == "thaw_return" and script != "zero_change":
+                chosen = chosen.assign(r_gain=table.r_gain)
+            row = {"method": script, "variable": variable, "seeds": len(table), "paper_r": published[its_name]}
+            rows.append(row | over_seeds(chosen) | pair_effects(pairs, variable))
+    return pd.DataFrame(rows)

@@ -1,0 +1,52 @@
+"""Adjacent pairs of weights where carbon falls or thaw rises as the carbon weight rises.
+
+Beside them what a policy that ignores the preference would show: the same points in an order drawn at random.
+"""
+
+import numpy as np
+import pandas as pd
+
+from analysis import metrics
+from analysis.results import METHODS
+from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
+
+TITLE = "Lambda violations"
+COLUMNS = ROW_COLUMNS | {
+    "pairs": "pairs of weights",
+    "violations_percent": "violations %",
+    "paper_violations_percent": "violations % (paper)",
+    "paper_detail_violations_percent": "violations % (paper's details)",
+    "significant_violations_percent": "beyond their 95 % interval %",
+    "noise_violations_percent": "in random order %",
+}
+
+
+def violations(one) -> dict:
+    """Of one run; empty for a policy that does not look at the preference, which has nothing to violate."""
+    front = metrics.mean_returns(one.evaluation).to_numpy()
+    if len(front) < 2 or not np.ptp(front, axis=0).any():
+        return {}
+    row = {"pairs": len(front) - 1, "violations_percent": metrics.violations_percent(front),
+           "noise_violations_percent": metrics.expected_violations_percent(front)}  # fmt: skip
+    return row | {"significant_violations_percent": metrics.significant_violations_percent(one.evaluation)}
+
+
+def make(results) -> pd.DataFrame:
+    """One row per method that is conditioned on the preference, environment and setting."""
+    published = paper("monotonicity_violations", index_col="method").violations_percent
+    details = paper("detailed_objectives").groupby("method")[["carbon_mean", "thaw_mean"]]
+    details = details.apply(metrics.violations_percent)
+    names = [name for name in COLUMNS if name in ("pairs", "violations_percent", "significant_violations_percent",
+                                                  "noise_violations_percent")]  # fmt: skip
+    rows = []
+    for key, replicates in results.rows.items():
+        if not any(job.script == key[0] and job.steps for job in results.jobs):
+            continue
+        table = pd.DataFrame([violations(one) for one in replicates], columns=names).astype(float)
+        row = row_of(key, len(table)) | over_seeds(table.drop(columns="pairs")) | {"pairs": table.pairs.mean()}
+        name = METHODS.get(key[0])
+        if results.is_papers(key) and key[1] == GENERALIST and name in published.index:
+            row["paper_violations_percent"] = published[name]
+            row["paper_detail_violations_percent"] = details.get(name, np.nan)
+        rows.append(row)
+    return pd.DataFrame(rows)

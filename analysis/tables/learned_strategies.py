@@ -1,0 +1,55 @@
+"""What the methods do with a stand, and what comes of it."""
+
+import pandas as pd
+
+from analysis.experiments import HEURISTICS, METHODS
+from analysis.results import METHODS as PAPER_NAMES
+from analysis.tables.common import mean_of_years, over_seeds, paper
+
+TITLE = "Learned strategies"
+YEARS = {"density_stems_ha": "density", "conifer_fraction": "conifer_fraction", "planted_stems_ha": "planted",
+         "thinned_stems_ha": "thinned", "max_lai": "max_lai", "winter_albedo": "winter_albedo",
+         "boundary_warming_mj_m2": "warming"}  # fmt: skip
+COLUMNS = {
+    "method": "method",
+    "seeds": "seeds",
+    "density": "density (stems/ha)",
+    "final_density": "density, last year",
+    "paper_density": "density (paper)",
+    "conifer_fraction": "conifer fraction",
+    "final_conifer_fraction": "conifer fraction, last year",
+    "paper_species": "species (paper)",
+    "planted": "planted (stems/ha/yr)",
+    "thinned": "thinned (stems/ha/yr)",
+    "max_lai": "LAI",
+    "winter_albedo": "winter albedo",
+    "carbon": "carbon",
+    "paper_carbon": "carbon (paper)",
+    "thaw": "thaw",
+    "paper_thaw_or_warming": "thaw (paper)",
+    "warming": "warming (MJ/m2/yr)",
+    "paper_note": "the paper's note",
+}
+
+
+def numbers(one) -> dict:
+    """Means over the episodes of one run: 50 years for the stand, all weights for the returns."""
+    row = {YEARS[name]: value for name, value in mean_of_years(one, list(YEARS)).items()}
+    years = one.years(["density_stems_ha", "conifer_fraction"])
+    last = years[years.year == years.year.max()].groupby("variable")["mean"].mean()
+    row |= {"final_density": last.density_stems_ha, "final_conifer_fraction": last.conifer_fraction}
+    return row | {"carbon": one.evaluation.carbon_return.mean(), "thaw": one.evaluation.thaw_return.mean()}
+
+
+def make(results) -> pd.DataFrame:
+    """One row per method; the annual record is of the weights 0, 0.5 and 1."""
+    published = paper("learned_strategies", index_col="method").add_prefix("paper_")
+    columns = [name for name in COLUMNS if name not in ("method", "seeds") and not name.startswith("paper_")]
+    rows = []
+    for script in (*METHODS, *HEURISTICS):
+        table = pd.DataFrame([numbers(one) for one in results.of("main", script)], columns=columns).astype(float)
+        row = {"method": script, "seeds": len(table)} | over_seeds(table)
+        if PAPER_NAMES[script] in published.index:
+            row |= published.loc[PAPER_NAMES[script]].to_dict()
+        rows.append(row)
+    return pd.DataFrame(rows)

@@ -1,0 +1,112 @@
+"""Main comparison: the metrics of every method, whether it follows the preference, and what constant plans reach."""
+
+import numpy as np
+import pandas as pd
+
+from analysis import metrics
+from analysis.constant_plans import as_evaluation
+from analysis.evaluation import EVAL_WEIGHTS
+from analysis.results import METHODS
+from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
+
+TITLE = "Main results"
+ENVIRONMENTS = (GENERALIST, "boreal-balanced-v0")
+CONSTANT_PLANS = {"dense_conifer": False, "best_constant_mix": True}
+COLUMNS = ROW_COLUMNS | {
+    "scalarized": "scalarised",
+    "paper_scalarized": "scalarised (paper)",
+    "sd_over_episodes": "sd over episodes",
+    "paper_sd_over_episodes": "sd over episodes (paper)",
+    "hypervolume": "hypervolume",
+    "paper_hypervolume": "hypervolume (paper)",
+    "paper_detail_hypervolume": "hypervolume (paper's details)",
+    "sparsity": "sparsity",
+    "paper_sparsity": "sparsity (paper)",
+    "paper_detail_sparsity": "sparsity (paper's details)",
+    "expected_utility": "expected utility",
+    "cardinality": "cardinality",
+    "gain_scalarized": "gain",
+    "gain_hypervolume": "gain hypervolume",
+    "gain_sparsity": "gain sparsity",
+    "carbon_change": "carbon, weight 0 to 1",
+    "thaw_change": "thaw, weight 0 to 1",
+    "carbon_slope": "slope of carbon",
+    "thaw_slope": "slope of thaw",
+}
+TERMINAL = ("method", "environment", "setting", "seeds", "scalarised", "scalarised (paper)", "hypervolume",
+            "hypervolume (paper)", "gain hypervolume")  # fmt: skip
+
+
+def front_metrics(evaluation: pd.DataFrame, prefix: str = "") -> dict:
+    """Mean scalarised return, hypervolume and sparsity of one run; one point has no sparsity."""
+    front = metrics.mean_returns(evaluation).to_numpy()
+    return {
+        f"{prefix}scalarized": metrics.mean_scalarized(evaluation),
+        f"{prefix}hypervolume": metrics.hypervolume(front),
+        f"{prefix}sparsity": metrics.sparsity(front) if np.ptp(front, axis=0).any() else np.nan,
+    }
+
+
+def run_metrics(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
+    """The metrics of one run; the response to the preference only of a policy that has one."""
+    front = metrics.mean_returns(evaluation)
+    row = front_metrics(evaluation) | {
+        "sd_over_episodes": evaluation.scalarized_return.std(),
+        "expected_utility": metrics.expected_utility(front.to_numpy()),
+        "cardinality": metrics.cardinality(front.to_numpy()),
+    }
+    if np.ptp(front.to_numpy(), axis=0).any():
+        response = metrics.preference_response(evaluation)
+        for objective in ("carbon", "thaw"):
+            for kind in ("change", "slope"):
+                row[f"{objective}_{kind}"] = response.loc[f"{objective}_return", kind]
+    return row if gains is None else row | front_metrics(gains, "gain_")
+
+
+NUMBERS = ("scalarized", "hypervolume", "sparsity", "expected_utility", "cardinality", "gain_scalarized",
+           "gain_hypervolume", "gain_sparsity", "carbon_change", "thaw_change", "carbon_slope", "thaw_slope",
+           "sd_over_episodes")  # fmt: skip
+
+
+def paper_rows() -> pd.DataFrame:
+    """The paper's main table, and what its own table of details gives for the same."""
+    table = paper("main_results", index_col="method")
+    fronts = paper("detailed_objectives").groupby("method")[["carbon_mean", "thaw_mean"]]
+    return pd.DataFrame({
+        "paper_scalarized": table.scalarized_mean,
+        "paper_sd_over_episodes": table.scalarized_std,
+        "paper_hypervolume": table.hypervolume,
+        "paper_sparsity": table.sparsity,
+        "paper_detail_hypervolume": fronts.apply(metrics.hypervolume),
+        "paper_detail_sparsity": fronts.apply(metrics.sparsity),
+    })  # fmt: skip
+
+
+def constant_plans(results) -> dict[tuple, list]:
+    """Rows of the constant plans: (name, environment, setting) -> its evaluation and gains."""
+    plans = results.study("constant_plans")
+    rows = {}
+    for env_id in ENVIRONMENTS:
+        for name, best in CONSTANT_PLANS.items():
+            key = name, env_id, "default"
+            rows[key] = []
+            if plans is not None:
+                evaluation = as_evaluation(plans[plans.env_id == env_id], EVAL_WEIGHTS, best)
+                rows[key] = [(evaluation, results.gains(evaluation, env_id))]
+    return rows
+
+
+def make(results) -> pd.DataFrame:
+    """One row per script, environment and setting, those trained on the asymmetric reward in generalist mode."""
+    evaluations = {key: [(one.evaluation, one.gains) for one in replicates] for key, replicates in results.rows.items()
+                   if key[1] in ENVIRONMENTS and "thaw_formulation" not in key[2]}  # fmt: skip
+    evaluations |= constant_plans(results)
+    published, rows = paper_rows(), []
+    for key in sorted(evaluations, key=lambda key: ENVIRONMENTS.index(key[1])):
+        table = pd.DataFrame([run_metrics(*one) for one in evaluations[key]], columns=NUMBERS)
+        row = row_of(key, len(table)) | over_seeds(table.drop(columns="sd_over_episodes"))
+        row["sd_over_episodes"] = table.sd_over_episodes.mean()
+        if results.is_papers(key) and key[1] == GENERALIST and METHODS.get(key[0]) in published.index:
+            row |= published.loc[METHODS[key[0]]].to_dict()
+        rows.append(row)
+    return pd.DataFrame(rows)

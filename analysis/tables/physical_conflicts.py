@@ -1,0 +1,54 @@
+"""What one change of a stand does to both objectives on the same sites and weathers (analysis/mechanism_pairs.py)."""
+
+import numpy as np
+import pandas as pd
+
+from analysis import metrics
+from analysis.mechanism_pairs import PAIRS
+from analysis.tables.common import paper
+
+TITLE = "Physical conflicts"
+EFFECTS = ("carbon_return", "thaw_return", "net_carbon_change_kgc_m2", "boundary_warming_mj_m2",
+           "ground_shortwave_mj_m2", "latent_heat_mj_m2", "peak_swe_mm", "winter_albedo")  # fmt: skip
+COLUMNS = {
+    "change": "change",
+    "sites": "sites",
+    "carbon_return": "carbon return",
+    "thaw_return": "thaw return",
+    "conflict": "conflict",
+    "share_of_sites_in_conflict": "sites in conflict %",
+    "paper_carbon": "carbon (paper)",
+    "paper_permafrost": "permafrost (paper)",
+    "paper_conflict": "conflict (paper)",
+    "boundary_warming_mj_m2": "warming (MJ/m2/yr)",
+    "ground_shortwave_mj_m2": "shortwave on ground (MJ/m2/yr)",
+    "latent_heat_mj_m2": "latent heat (MJ/m2/yr)",
+    "peak_swe_mm": "peak snow (mm)",
+    "winter_albedo": "winter albedo",
+}
+
+
+def verdict(carbon: tuple[float, float], thaw: tuple[float, float]) -> str:
+    """yes if one objective gains and the other loses, beyond their intervals (mean, half width); else no or unclear."""
+    signs = [0 if not abs(mean) > half_width else np.sign(mean) for mean, half_width in (carbon, thaw)]
+    return "unclear" if 0 in signs else "yes" if signs[0] != signs[1] else "no"
+
+
+def make(results) -> pd.DataFrame:
+    """One row per pair: the mean over the sites of upper less lower, with its 95 % interval."""
+    published = paper("physical_conflicts", index_col="variable").add_prefix("paper_")
+    pairs, rows = results.study("mechanism_pairs"), []
+    for pair in PAIRS:
+        row = {"change": pair, "conflict": "not played yet"}
+        row |= next((published.loc[name].to_dict() for name in published.index if pair.startswith(name)), {})
+        if pairs is not None:
+            sites = pairs[pairs.pair == pair]
+            apart = {name: (sites[f"upper_{name}"] - sites[f"lower_{name}"]).to_numpy() for name in EFFECTS}
+            means = {name: metrics.mean_interval(values) for name, values in apart.items()}
+            for name, (mean, half_width) in means.items():
+                row |= {name: mean, f"{name}_low": mean - half_width, f"{name}_high": mean + half_width}
+            opposed = np.sign(apart["carbon_return"]) * np.sign(apart["thaw_return"]) < 0
+            row |= {"sites": len(sites), "conflict": verdict(means["carbon_return"], means["thaw_return"]),
+                    "share_of_sites_in_conflict": 100 * opposed.mean()}  # fmt: skip
+        rows.append(row)
+    return pd.DataFrame(rows)

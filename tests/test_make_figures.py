@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from tiny_runs import TINY_RUNS, write_run
+
+from analysis import experiments, make_figures, make_tables
+from analysis.figures import training_dynamics
+from analysis.figures.common import no_data
+from analysis.results import Results
+
+PANELS = {"learning_asymmetry": 4, "algorithm_comparison": 4, "strategies": 4, "site_influence": 2,
+          "trade_off_coverage": 4, "training_dynamics": 2, "performance_panel": 4, "individual_objectives": 4,
+          "demographics": 7}  # fmt: skip
+
+
+def lettered(figure):
+    """Panels of a figure by letter."""
+    return {ax.get_title("left")[1]: ax for ax in figure.get_axes() if ax.get_title("left")}
+
+
+def words(ax):
+    return " ".join(text.get_text().replace("\n", " ") for text in ax.texts)
+
+
+@pytest.fixture(scope="module")
+def figures():
+    """Figures of the tiny runs: the curriculum and zero change, nothing else."""
+    results = Results((TINY_RUNS,), experiments.jobs(), TINY_RUNS / "no studies")
+    return {make_tables.name_of(module): make_figures.draw(module, results) for module in make_figures.FIGURES}
+
+
+def test_the_papers_panels(figures):
+    assert {name: len(lettered(figure)) for name, figure in figures.items()} == PANELS
+    for name, figure in figures.items():
+        assert figure.get_supxlabel(), name  # what the bands are
+
+
+def test_a_panel_without_data_says_which_command_makes_it(figures):
+    for ax in lettered(figures["learning_asymmetry"]).values():
+        assert "no run yet: python cleanrl_style/eupg_fixed_lambda.py" in words(ax)
+    assert "python cleanrl_style/eupg_var_lambda.py" in words(lettered(figures["trade_off_coverage"])["b"])
+
+
+def test_a_panel_that_lacks_some_names_them(figures):
+    for name in ("strategies", "training_dynamics", "individual_objectives", "demographics"):
+        for ax in lettered(figures[name]).values():
+            assert "no run yet: eupg_var_lambda, ppo_gated (python analysis/reproduce.py --only main)" in words(ax)
+
+
+def test_what_is_drawn_is_what_the_runs_hold(figures):
+    carbon = lettered(figures["individual_objectives"])["c"].lines[0]
+    assert carbon.get_xdata().tolist() == [0, 0.5, 1] and carbon.get_ydata() == pytest.approx([0, 1, 2])
+    density = lettered(figures["strategies"])["b"].lines[0]
+    assert density.get_ydata() == pytest.approx([400, 1200])
+    learning = lettered(figures["individual_objectives"])["a"].lines[0]
+    assert learning.get_ydata() == pytest.approx([0, 1, 2, 3])
+    assert learning.get_xdata() == pytest.approx(np.array([75, 150, 225, 300]) - 3.75)
+
+
+def test_the_same_bytes_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(make_figures, "FIGURES", (training_dynamics,))
+    write_run(tmp_path / "runs" / "zero", "zero_change")
+    for name in ("first", "second"):
+        make_figures.main(make_figures.Args(runs_dir=(tmp_path / "runs",), figures_dir=tmp_path / name))
+    names = sorted(path.name for path in (tmp_path / "first").iterdir())
+    assert names == ["training_dynamics.pdf", "training_dynamics.png"]
+    for name in names:
+        assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
+
+
+def test_without_runs_it_names_a_command(tmp_path):
+    with pytest.raises(SystemExit, match="python baselines_heuristic/zero_change.py"):
+        make_figures.main(make_figures.Args(runs_dir=(tmp_path,), figures_dir=tmp_path / "figures"))
+    assert not (tmp_path / "figures").exists()
+
+
+def test_an_empty_panel_shows_its_command():
+    ax = Figure().subplots()
+    no_data(ax, "python a.py --seed 1")
+    assert words(ax) == "no run yet: python a.py --seed 1"

@@ -1,0 +1,59 @@
+import numpy as np
+import pandas as pd
+import pytest
+from scripts import run_script
+
+from analysis import constant_plans, mechanism_pairs, site_warming, stored
+from analysis.evaluation import EVAL_WEIGHTS
+
+
+def test_a_pair_differs_in_its_one_thing(monkeypatch):
+    chosen = [name for name in mechanism_pairs.PAIRS if name.startswith(("conifer", "growing season by"))]
+    monkeypatch.setattr(mechanism_pairs, "PAIRS", {name: mechanism_pairs.PAIRS[name] for name in chosen})
+    table = mechanism_pairs.study(sites=2, years=2).set_index("pair")
+    climate, conifers = (table.loc[name] for name in chosen)
+    assert (climate.upper_growing_season_days > climate.lower_growing_season_days).all()
+    # the same weather: the air is the same whatever stands in it
+    assert (conifers.upper_growing_season_days == conifers.lower_growing_season_days).all()
+    assert (conifers.upper_winter_albedo < conifers.lower_winter_albedo).all()
+    assert table.site_seed.nunique() == 2
+
+
+def test_constant_plans_as_an_evaluation():
+    plans = pd.DataFrame({"action": [24, 24, 20, 20], "seed": [0, 1, 0, 1], "episode": [0, 1, 0, 1],
+                          "carbon_return": [2.0, 4.0, 1.0, 1.0], "thaw_return": [-3.0, -1.0, 0.0, 2.0]})
+    best = constant_plans.as_evaluation(plans, EVAL_WEIGHTS, best=True)
+    # conifers 3 w - 2 (1 - w), deciduous w + (1 - w): equal at w = 0.6
+    chosen = best.groupby("preference").action.first()
+    assert (chosen[chosen.index < 0.55] == 20).all() and (chosen[chosen.index > 0.65] == 24).all()
+    assert best[best.preference == 1].scalarized_return.tolist() == [2, 4]
+    dense = constant_plans.as_evaluation(plans, EVAL_WEIGHTS, best=False)
+    assert (dense.action == 24).all() and len(dense) == 2 * len(EVAL_WEIGHTS)
+
+
+def test_drawn_episodes_are_of_both_kinds():
+    episodes = pd.DataFrame({"site_seed": range(20), "selected": [0] * 5 + [1] * 15})
+    drawn = site_warming.drawn_episodes(episodes, seed=1, each=8)
+    assert drawn.selected.value_counts().to_dict() == {1: 8, 0: 5}
+    assert drawn.site_seed.is_unique
+    assert drawn.equals(site_warming.drawn_episodes(episodes, seed=1, each=8))
+    assert not drawn.equals(site_warming.drawn_episodes(episodes, seed=2, each=8))
+
+
+def test_a_study_is_made_once(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(constant_plans, "PLANTING", (24,))
+    monkeypatch.setattr(constant_plans.results, "QUICK_STUDIES_DIR", tmp_path)
+    monkeypatch.setattr(constant_plans.open_loop, "fingerprint", lambda: "physics")
+    constant_plans.main(constant_plans.Args(quick=True))
+    table = stored.read(tmp_path / "constant_plans.csv")
+    assert table.groupby("env_id").size().tolist() == [2, 2]
+    carbon = table.pivot(index="seed", columns="env_id", values=["carbon_return", "thaw_return"])
+    np.testing.assert_allclose(*carbon.thaw_return.to_numpy().T)  # environments differ in the carbon scale alone
+    constant_plans.main(constant_plans.Args(quick=True))
+    assert "is finished" in capsys.readouterr().out
+
+
+def test_site_warming_needs_the_curriculum(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit, match="ppo_curriculum.py --seed 1"):
+        run_script("analysis/site_warming.py")
