@@ -8,6 +8,7 @@ import sys
 import gymnasium as gym
 import tyro
 
+import boreal_env
 from analysis.evaluation import FIRST_EVALUATION_SEED, MODES
 
 MAX_ENVS = 1000
@@ -32,6 +33,7 @@ LIMITS = {
     "ent_coef": (0, 10),
     "vf_coef": (0, 10),
     "max_grad_norm": (0, 10**6),
+    "reward_scales": (0, 10**6),
     "threshold": (0, 1),
     "preference": (0, 1),
 }
@@ -111,6 +113,11 @@ def prepare(args) -> dict:
     env_kwargs = {"thaw_formulation": args.thaw_formulation} if boreal else {}
     if args.site_seed is not None:
         env_kwargs["site_seed"] = args.site_seed
+    if getattr(args, "hide_site", False):
+        if not boreal or args.mode == "site-specific":
+            generalist = " and ".join(name for name, mode in MODES.items() if mode == "generalist")
+            fail(f"--hide-site is for {generalist}: --env-id {args.env_id} observes no site parameters")
+        env_kwargs["observation_groups"] = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
     if boreal and hasattr(args, "preference"):
         env_kwargs["fixed_preference"] = args.preference
     if not boreal and hasattr(args, "preference") and args.vectorization == "lockstep":

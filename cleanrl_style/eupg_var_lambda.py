@@ -32,6 +32,8 @@ class Args:
     """another fixed site, in site-specific mode"""
     thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
     """formula of the thaw reward"""
+    hide_site: bool = False
+    """observe no site parameters"""
     total_timesteps: int | None = None
     """steps, summed over all environments; episodes are played whole (None: 300000, in site-specific mode 100000)"""
     num_envs: int | None = None

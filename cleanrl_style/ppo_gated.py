@@ -31,6 +31,8 @@ class Args:
     """another fixed site, in site-specific mode"""
     thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
     """formula of the thaw reward"""
+    hide_site: bool = False
+    """observe no site parameters"""
     total_timesteps: int | None = None
     """steps, summed over all environments (None: 300000, in site-specific mode 100000)"""
     num_envs: int | None = None
@@ -63,6 +65,10 @@ class Args:
     """weight of the value loss"""
     max_grad_norm: float = 0.5
     """largest norm of the gradient"""
+    reward_scales: tuple[float, float] = (1.0, 1.0)
+    """factors of the carbon and the thaw reward, before they are scalarised for training"""
+    per_objective_advantages: bool = False
+    """a value for each objective, whose advantages are normalised over the rollout before they are scalarised"""
 
     # Evaluation and output
     eval_episodes: int = 100
@@ -88,7 +94,7 @@ def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
 class Agent(nn.Module):
     """A gate chooses planting (actions 15-24) or not (0-14); each has its own head."""
 
-    def __init__(self, envs):
+    def __init__(self, envs, num_values=1):
         super().__init__()
         observation_dim = np.array(envs.single_observation_space.shape).prod()
         self.critic = nn.Sequential(
@@ -96,7 +102,7 @@ class Agent(nn.Module):
             nn.Tanh(),
             layer_init(nn.Linear(64, 64)),
             nn.Tanh(),
-            layer_init(nn.Linear(64, 1), std=1.0),
+            layer_init(nn.Linear(64, num_values), std=1.0),
         )
         self.actor = nn.Sequential(
             layer_init(nn.Linear(observation_dim, 64)),
@@ -130,7 +136,7 @@ class Agent(nn.Module):
 
 
 def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda):
-    """Advantages (steps, envs); dones[t] says that step t follows the end of an episode.
+    """Advantages (steps, envs, values), each value's for itself; dones[t] says that step t follows an episode's end.
 
     The end of an episode is terminal: nothing is worth anything beyond it, so nothing is bootstrapped.
     """
@@ -145,10 +151,16 @@ def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda
     return advantages
 
 
+def weigh_advantages(advantages, preferences, trained):
+    """Advantages (n,) of two objectives' (n, 2), each first normalised by its mean and deviation over `trained`."""
+    mean, std = advantages[trained].mean(dim=0), advantages[trained].std(dim=0, correction=0)
+    return protocol.scalarize(*((advantages - mean) / (std + 1e-8)).T, preferences)
+
+
 def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value, args):
     """Policy loss, value loss, entropy, two estimates of the KL divergence and clip fraction of a minibatch."""
     _, logprob, entropy, value = agent.get_action_and_value(x, mask, action)
-    value = value.view(-1)
+    value = value.view_as(target)
     logratio = logprob - old_logprob
     ratio = logratio.exp()
 
@@ -193,7 +205,8 @@ if __name__ == "__main__":
             boreal_env.warm_up(args.num_envs if args.vectorization == "lockstep" else 1)  # before workers are forked
         envs = run.make_envs(env_kwargs)
 
-        agent = Agent(envs)
+        num_values = 2 if args.per_objective_advantages else 1  # of the scalarised reward
+        agent = Agent(envs, num_values)
         optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
 
         # TRY NOT TO MODIFY: start the game
@@ -223,21 +236,21 @@ if __name__ == "__main__":
             masks = torch.zeros((num_steps, args.num_envs, 25), dtype=torch.bool)
             actions = torch.zeros((num_steps, args.num_envs), dtype=torch.long)
             logprobs = torch.zeros((num_steps, args.num_envs))
-            rewards = torch.zeros((num_steps, args.num_envs))
-            dones = torch.zeros((num_steps, args.num_envs))
-            values = torch.zeros((num_steps, args.num_envs))
+            rewards = torch.zeros((num_steps, args.num_envs, num_values))
+            dones = torch.zeros((num_steps, args.num_envs, 1))
+            values = torch.zeros((num_steps, args.num_envs, num_values))
             rollout_start, env_seconds = time.perf_counter(), 0.0
 
             for step in range(num_steps):
                 global_step += args.num_envs
                 obs[step] = torch.from_numpy(next_obs)
                 masks[step] = torch.from_numpy(protocol.action_masks(envs, next_obs, args.env_id))
-                dones[step] = torch.from_numpy(next_done)
+                dones[step] = torch.from_numpy(next_done)[:, None]
 
                 # ALGO LOGIC: action logic
                 with torch.no_grad():
                     action, logprob, _, value = agent.get_action_and_value(obs[step], masks[step])
-                    values[step] = value.flatten()
+                    values[step] = value
                 actions[step] = action
                 logprobs[step] = logprob
 
@@ -248,8 +261,10 @@ if __name__ == "__main__":
                 env_seconds += time.perf_counter() - env_start
                 next_done = terminations | truncations
                 episode_returns += reward
-                scalarized = protocol.scalarize(reward[:, 0], reward[:, 1], preferences)
-                rewards[step] = torch.from_numpy(scalarized)
+                scaled = reward * args.reward_scales
+                if not args.per_objective_advantages:
+                    scaled = protocol.scalarize(scaled[:, :1], scaled[:, 1:], preferences[:, None])
+                rewards[step] = torch.from_numpy(scaled)
 
                 for i in np.flatnonzero(next_done):
                     episode += 1
@@ -269,8 +284,8 @@ if __name__ == "__main__":
 
             # advantages, and bootstrap values of the episodes that the rollout cuts
             with torch.no_grad():
-                next_value = agent.get_value(torch.from_numpy(next_obs)).flatten()
-            last_done = torch.from_numpy(next_done).float()
+                next_value = agent.get_value(torch.from_numpy(next_obs))
+            last_done = torch.from_numpy(next_done).float()[:, None]
             advantages = compute_gae(rewards, values, dones, next_value, last_done, args.gamma, args.gae_lambda)
             returns = advantages + values
 
@@ -279,10 +294,15 @@ if __name__ == "__main__":
             b_masks = masks.flatten(0, 1)
             b_logprobs = logprobs.flatten()
             b_actions = actions.flatten()
-            b_advantages = advantages.flatten()
-            b_returns = returns.flatten()
-            b_values = values.flatten()
+            b_advantages = advantages.flatten(0, 1)
+            b_returns = returns.flatten(0, 1)
+            b_values = values.flatten(0, 1)
             b_inds = np.arange(num_steps * args.num_envs)
+
+            # one advantage a transition
+            if args.per_objective_advantages:
+                b_advantages = weigh_advantages(b_advantages, b_obs[:, 0], b_inds)
+            b_advantages = b_advantages.flatten()
 
             # Optimizing the policy and value network
             num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
@@ -309,7 +329,7 @@ if __name__ == "__main__":
             row = {"iteration": iteration, "global_step": global_step}
             if losses:
                 row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0), strict=True))
-                row["explained_variance"] = (1 - (y_true - y_pred).var() / y_true.var()).item()
+                row["explained_variance"] = (1 - (y_true - y_pred).var(dim=0).sum() / y_true.var(dim=0).sum()).item()
 
             run.log("updates", row)
             run.time("update", global_step, time.perf_counter() - update_start)

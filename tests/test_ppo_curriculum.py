@@ -13,8 +13,8 @@ from scripts import ROOT, run_script
 from toy_env import optimal_return
 
 import boreal_env
-from analysis import protocol
-from cleanrl_style.ppo_curriculum import Agent, Args, Curriculum, compute_gae
+from analysis import protocol, run_folder
+from cleanrl_style.ppo_curriculum import Agent, Args, Curriculum, compute_gae, weigh_advantages
 
 SCRIPT = "cleanrl_style/ppo_curriculum.py"
 OBSERVATIONS = 105
@@ -92,11 +92,34 @@ def test_gae_of_a_hand_computed_episode():
     torch.testing.assert_close(advantages.flatten(), torch.tensor([1.4375, 1.75, 1.0, 3.0]))
 
 
+def test_gae_of_two_objectives_is_that_of_their_weighted_sum():
+    # linear in rewards and values: so, if the critic's values add up, weighing commutes with it
+    generator = torch.Generator().manual_seed(0)
+    rewards, values = torch.rand((2, 20, 3, 2), generator=generator, dtype=torch.double)
+    next_value = torch.rand((3, 2), generator=generator, dtype=torch.double)
+    dones = torch.rand((21, 3, 1), generator=generator) < 0.2
+    dones, last_done = dones[:-1].double(), dones[-1].double()
+    weights = torch.tensor([0.3, 0.7], dtype=torch.double)
+
+    vector = compute_gae(rewards, values, dones, next_value, last_done, 0.9, 0.8)
+    scalar = compute_gae((rewards @ weights)[..., None], (values @ weights)[..., None], dones,
+                         (next_value @ weights)[..., None], last_done, 0.9, 0.8)
+    assert vector.shape == (20, 3, 2)
+    torch.testing.assert_close((vector @ weights)[..., None], scalar)
+
+
+def test_advantages_are_normalised_per_objective_then_weighed():
+    # of the trained ones (0, 1): carbon 1, 3 has mean 2 and deviation 1; thaw 10, 50 has 30 and 20
+    advantages = torch.tensor([[1.0, 10.0], [3.0, 50.0], [4.0, 50.0]])
+    weighed = weigh_advantages(advantages, torch.tensor([1.0, 0.25, 0.5]), np.array([0, 1]))
+    torch.testing.assert_close(weighed, torch.tensor([-1.0, 1.0, 1.5]))
+
+
 # --------------------------------------------------------------------------------------------- curriculum
 
 
-def make_curriculum(raw=False, seed=1, size=OBSERVATIONS):
-    return Curriculum(size, seed, 0.5, raw)
+def make_curriculum(raw=False, seed=1, size=OBSERVATIONS, selector="network"):
+    return Curriculum(size, seed, 0.5, raw, selector)
 
 
 def test_scores_are_centred_and_scaled_over_sampled_sites():
@@ -127,6 +150,15 @@ def test_the_selector_sees_only_the_site():
 
 def test_without_site_observations_every_episode_is_accepted():
     assert (make_curriculum(size=43).score(np.zeros((4, 43), np.float32)) > 0.5).all()
+
+
+def test_a_coin_accepts_half_whatever_the_site():
+    curriculum = make_curriculum(selector="coin")
+    scores = curriculum.score(np.zeros((10_000, 3), np.float32))
+    assert (scores > 0.5).mean() == pytest.approx(0.5, abs=0.02)
+    assert len(set(scores)) == 10_000 and 0 <= scores.min() and scores.max() < 1
+    again, other = (make_curriculum(selector="coin", seed=seed).score(np.ones((10_000, 105))) for seed in (1, 2))
+    assert (again == scores).all() and abs(np.corrcoef(other, scores)[0, 1]) < 0.05
 
 
 @pytest.mark.parametrize("finished, factor", [
@@ -205,7 +237,59 @@ def test_threshold_path_follows_from_the_episodes(finished_run):
         start = update.global_step
 
 
+def test_a_coins_run_resumes_to_the_same_bytes(tmp_path, monkeypatch):
+    monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 256)
+    arguments = ("--selector", "coin", "--update-epochs", 1)
+    train(tmp_path / "whole", *arguments, env_id="resumable_toy:resumable-toy-v0")
+
+    def interrupt(run, *args, **kwargs):
+        save(run, *args, **kwargs)
+        raise KeyboardInterrupt
+
+    save = run_folder.Run.save
+    with monkeypatch.context() as patch, pytest.raises(SystemExit, match="130"):
+        patch.setattr(run_folder.Run, "save", interrupt)
+        train(tmp_path / "parts", *arguments, env_id="resumable_toy:resumable-toy-v0")
+    assert not (tmp_path / "parts" / "evaluation.csv").exists()
+    train(tmp_path / "parts", *arguments, env_id="resumable_toy:resumable-toy-v0")
+    for path in (tmp_path / "whole").iterdir():
+        if path.name != "timing.csv":
+            assert path.read_bytes() == (tmp_path / "parts" / path.name).read_bytes(), path.name
+    episodes = pd.read_csv(tmp_path / "whole" / "episodes.csv")
+    assert episodes.score.nunique() == len(episodes) == 64 and 0.3 < episodes.selected.mean() < 0.7
+
+
 # ------------------------------------------------------------------------------------------------- script
+
+
+@pytest.mark.parametrize("arguments", [
+    ["--reward-scales", 3, 0.5], ["--per-objective-advantages"], ["--per-objective-advantages", "--clip-vloss"],
+])
+def test_a_flag_changes_the_updates_and_no_units(arguments, finished_run, tmp_path):
+    train(tmp_path, *arguments)
+    ours, default = (pd.read_csv(folder / "updates.csv") for folder in (tmp_path, finished_run))
+    assert np.isfinite(ours.to_numpy()).all() and (ours.value_loss != default.value_loss).all()
+    # the first rollout is played by the agent's initial policy, which the flags do not change
+    ours, default = (pd.read_csv(folder / "episodes.csv") for folder in (tmp_path, finished_run))
+    if "--reward-scales" in arguments:
+        first = ours.global_step <= 256
+        pd.testing.assert_frame_equal(ours[first], default[first])
+    np.testing.assert_allclose(
+        ours.scalarized_return,
+        ours.preference * ours.carbon_return + (1 - ours.preference) * ours.thaw_return, rtol=1e-6)
+
+
+@pytest.mark.parametrize("script, arguments", [
+    ("ppo_gated", ["--rollout-steps", "100"]), ("ppo_curriculum", ["--rollout-steps", "100", "--selector", "coin"]),
+    ("eupg_var_lambda", []),
+])
+def test_hiding_the_site_leaves_43_observations(script, arguments, tmp_path):
+    run_script(f"cleanrl_style/{script}.py", "--hide-site", "--run-dir", tmp_path, "--total-timesteps", 100,
+               "--num-envs", 2, "--vectorization", "lockstep", "--eval-episodes", 1, "--eval-weights", 0.5, *arguments)
+    agent = torch.load(tmp_path / "checkpoint.pt", weights_only=False)["agent"]
+    accrued_returns = 2 if "eupg" in script else 0
+    assert agent["actor.0.weight"].shape[1] == OBSERVATIONS - 62 + accrued_returns
+    assert len(pd.read_csv(tmp_path / "evaluation.csv")) == 2
 
 
 def test_same_command_twice_gives_the_same_bytes(finished_run, tmp_path):
@@ -258,6 +342,11 @@ def test_learns_the_toy(tmp_path):
     (["--site-seed", "3"], "--site-seed is for --mode site-specific"),
     (["--thaw-formulation", "contrast", "--env-id", "toy_env:toy-v0"], "not for --env-id toy_env:toy-v0"),
     (["--vectorization", "lockstep", "--env-id", "toy_env:toy-v0"], "no vector entry point"),
+    (["--reward-scales", "1", "-1"], "--reward-scales must lie in [0, 1000000], not -1"),
+    (["--hide-site", "--mode", "site-specific"], "--hide-site is for boreal-generalist-v0 and boreal-balanced-v0"),
+    (["--hide-site", "--env-id", "toy_env:toy-v0"], "--env-id toy_env:toy-v0 observes no site parameters"),
+    (["--hide-site"], "--hide-site leaves --selector network nothing to score"),
+    (["--selector", "coin", "--raw-selector"], "--raw-selector is for --selector network"),
 ])
 def test_bad_arguments_leave_nothing_behind(arguments, message, tmp_path):
     with pytest.raises(SystemExit, match="^error: ") as exit:

@@ -1,3 +1,4 @@
+import json
 import os
 import signal
 from collections import Counter
@@ -7,10 +8,13 @@ import pytest
 from scripts import run_script
 from tiny_runs import TINY_RUNS
 
-from analysis import experiments, reproduce
+import boreal_env
+from analysis import experiments, protocol, reproduce, runs
 from analysis.experiments import Job
+from cleanrl_style.ppo_gated import Args
 
-COUNTS = {"main": 36, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 15, "mechanisms": 2}
+COUNTS = {"main": 36, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 25, "variants": 15,
+          "mechanisms": 2}
 
 
 def test_experiments():
@@ -38,6 +42,19 @@ def test_a_job_knows_its_run():
     assert not job.made(config | {"arguments": config["arguments"] | {"seed": 2}})
     assert not job.made(config | {"not_default": {"learning_rate": 0.1}})
     assert not job.made(config | {"script": "ppo_gated"})
+
+
+def test_a_variant_knows_its_run():
+    job = next(job for job in experiments.jobs(["variants"]) if "reward_scales" in job.flags)
+    assert job.command == ("python cleanrl_style/ppo_gated.py --seed 1 --vectorization lockstep "
+                           "--reward-scales 1.43 1")
+    args = Args(vectorization="lockstep", reward_scales=(1.43, 1.0))
+    protocol.resolve(args)
+    config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}
+    config = json.loads(json.dumps(config))
+    assert job.made(config) and job.row[2] == runs.setting(config["not_default"])
+    carbon, thaw = experiments.REWARD_SCALES
+    assert carbon / thaw == pytest.approx(boreal_env.Reward().carbon_scale / boreal_env.BALANCED_CARBON_SCALE, abs=0.005)
 
 
 def test_every_row_has_its_first_job():
