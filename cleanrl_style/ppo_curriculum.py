@@ -389,12 +389,10 @@ if __name__ == "__main__":
             # CURRICULUM: skipped episodes are in no gradient; a rollout without selected ones has no update
             b_inds = b_inds[selecteds.flatten().numpy()]
 
-            # one advantage a transition
+            # Optimizing the policy and value network
             if args.per_objective_advantages:
                 b_advantages = weigh_advantages(b_advantages, b_obs[:, 0], b_inds)
             b_advantages = b_advantages.flatten()
-
-            # Optimizing the policy and value network
             num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
             losses = []
             y_pred, y_true = b_values[b_inds], b_returns[b_inds]

@@ -299,12 +299,10 @@ if __name__ == "__main__":
             b_values = values.flatten(0, 1)
             b_inds = np.arange(num_steps * args.num_envs)
 
-            # one advantage a transition
+            # Optimizing the policy and value network
             if args.per_objective_advantages:
                 b_advantages = weigh_advantages(b_advantages, b_obs[:, 0], b_inds)
             b_advantages = b_advantages.flatten()
-
-            # Optimizing the policy and value network
             num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
             losses = []
             y_pred, y_true = b_values[b_inds], b_returns[b_inds]

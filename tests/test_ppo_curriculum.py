@@ -269,9 +269,8 @@ def test_a_flag_changes_the_updates_and_no_units(arguments, finished_run, tmp_pa
     train(tmp_path, *arguments)
     ours, default = (pd.read_csv(folder / "updates.csv") for folder in (tmp_path, finished_run))
     assert np.isfinite(ours.to_numpy()).all() and (ours.value_loss != default.value_loss).all()
-    # the first rollout is played by the agent's initial policy, which the flags do not change
     ours, default = (pd.read_csv(folder / "episodes.csv") for folder in (tmp_path, finished_run))
-    if "--reward-scales" in arguments:
+    if "--reward-scales" in arguments:  # the initial policy, which plays the first rollout, is the default's
         first = ours.global_step <= 256
         pd.testing.assert_frame_equal(ours[first], default[first])
     np.testing.assert_allclose(
