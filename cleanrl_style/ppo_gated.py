@@ -153,7 +153,8 @@ def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda
 
 def weigh_advantages(advantages, preferences, trained):
     """Advantages (n,) of two objectives' (n, 2), each first normalised by its mean and deviation over `trained`."""
-    mean, std = advantages[trained].mean(dim=0), advantages[trained].std(dim=0, correction=0)
+    mean = advantages[trained].mean(dim=0)
+    std = (advantages[trained] - mean).square().mean(dim=0).sqrt()
     return protocol.scalarize(*((advantages - mean) / (std + 1e-8)).T, preferences)
 
 
