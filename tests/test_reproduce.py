@@ -151,6 +151,7 @@ def test_stopping_ends_the_children(fake, monkeypatch):
     def sleep(seconds):
         true_sleep(seconds)
         if begun[0].log.exists() and begun[0].steps() == 40:
+            monkeypatch.setattr(reproduce.time, "sleep", true_sleep)  # waiting for the process sleeps too
             raise KeyboardInterrupt
 
     true_start, true_sleep = reproduce.start, reproduce.time.sleep
