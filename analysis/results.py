@@ -126,6 +126,23 @@ class Results:
         """Whether a row is one of the paper's: no control, and not of the balanced environment."""
         return key[2] == "default" or any(job.row == key for job in self.jobs if job.experiment in ("main", "fixed"))
 
+    def is_trained(self, key: tuple) -> bool:
+        """Whether a row is of a script that trains, by its jobs or its runs."""
+        return any(job.row == key and job.steps for job in self.jobs) or any(
+            "total_timesteps" in one.runs[0].arguments for one in self.rows[key])  # fmt: skip
+
+    def of_main_and_others(self, scripts) -> dict[tuple, list[Replicate]]:
+        """Rows of the main experiment's scripts, then those of scripts that no experiment has, such as one's own.
+
+        The others' rows are those of the main experiment's environment and thaw formulation.
+        """
+        planned = {job.script for job in self.jobs}
+        keys = [self.first_job("main", script).row for script in scripts]
+        environment = keys[0][1]
+        keys += [key for key in self.rows if key[0] not in planned and key[1] == environment
+                 and "thaw_formulation" not in key[2]]  # fmt: skip
+        return {key: self.rows[key] for key in keys}
+
     def first_job(self, experiment: str, script: str) -> experiments.Job:
         """The first job of an experiment's script."""
         return next(job for job in self.jobs if job.experiment == experiment and job.script == script)

@@ -139,6 +139,32 @@ def test_seeds_are_aggregated_and_settings_kept_apart(tmp_path):
     assert np.isnan(short.paper_scalarized)  # a control is no row of the paper's
 
 
+def test_a_method_that_no_experiment_has_is_in_every_table_of_methods(tmp_path):
+    write_run(tmp_path / "runs" / "zero", "zero_change")
+    write_run(tmp_path / "runs" / "own", "ppo_mine", carbon=(1, 1, 2), thaw=(2, 3, 0), vectorization="lockstep")
+    write_run(tmp_path / "runs" / "other", "ppo_mine", weights=(0.2, 0.8), carbon=(0, 1), thaw=(1, 0), clip_coef=0.1)
+    years = tmp_path / "runs" / "other" / "evaluation_years.csv"
+    pd.read_csv(years).assign(preference=0.2).to_csv(years, index=False)
+    write_run(tmp_path / "runs" / "balanced", "ppo_mine", env_id="boreal-balanced-v0")
+    make(tmp_path / "runs", tmp_path / "tables")
+    key = ("ppo_mine", "boreal-generalist-v0", "vectorization=lockstep")
+    index = ["method", "environment", "setting"]
+    rows = {name: read(tmp_path / "tables", name, index).loc[[key]] for name in
+            ("main_results", "lambda_violations", "learned_strategies", "growing_season_correlations",
+             "detailed_objectives")}
+    assert rows["main_results"].seeds.tolist() == [1]
+    assert rows["lambda_violations"].violations_percent.tolist() == [50]  # thaw rises from weight 0 to 0.5
+    assert rows["learned_strategies"].carbon.tolist() == pytest.approx([4 / 3])
+    assert len(rows["growing_season_correlations"]) == 3
+    assert rows["detailed_objectives"].thaw_gain.notna().all()
+    strategies = read(tmp_path / "tables", "learned_strategies", index)
+    assert strategies.index[-2:].tolist() == [("ppo_mine", key[1], "clip_coef=0.1"), key]
+    # its annual record is of weights that tables do not read
+    assert np.isnan(strategies.density.iloc[-2]) and strategies.carbon.iloc[-2] == 0.5
+    violations = read(tmp_path / "tables", "lambda_violations", index)
+    assert "zero_change" not in violations.index.get_level_values("method")
+
+
 def test_agents_of_one_weight_form_a_front(tmp_path, capsys):
     for seed in (1, 2):
         for weight in (0.0, 0.25, 0.5, 0.75, 1.0)[: 5 if seed == 1 else 4]:

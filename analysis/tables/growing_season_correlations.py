@@ -8,17 +8,15 @@ import pandas as pd
 
 from analysis import metrics
 from analysis.experiments import METHODS
-from analysis.tables.common import over_seeds, paper
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Growing-season correlations"
 VARIABLES = {"thaw_return": "thaw_reward", "latent_heat_mj_m2": "latent_heat",
              "ground_shortwave_mj_m2": "ground_radiation"}  # fmt: skip
 SEASON_PAIRS = {"leaves": "growing season of leaves, 40 days longer",
                 "climate": "growing season by a climate 1 K warmer"}  # fmt: skip
-COLUMNS = {
-    "method": "method",
+COLUMNS = ROW_COLUMNS | {
     "variable": "variable",
-    "seeds": "seeds",
     "r": "r",
     "paper_r": "r (paper, all methods)",
     "r_gain": "r of the gain",
@@ -47,17 +45,16 @@ def pair_effects(pairs: pd.DataFrame | None, variable: str) -> dict:
 
 
 def make(results) -> pd.DataFrame:
-    """One row per method and variable."""
+    """One row per method and variable, the methods of one's own last."""
     published = paper("growing_season_correlations", index_col="variable").r
     pairs = results.study("mechanism_pairs")
     rows = []
-    for script in ("zero_change", *METHODS):
-        replicates = results.of("main", script)
+    for key, replicates in results.of_main_and_others(("zero_change", *METHODS)).items():
         table = pd.DataFrame([correlations(one) for one in replicates], columns=[*VARIABLES, "r_gain"]).astype(float)
         for variable, its_name in VARIABLES.items():
             chosen = table[[variable]].set_axis(["r"], axis=1)
-            if variable == "thaw_return" and script != "zero_change":
+            if variable == "thaw_return" and key[0] != "zero_change":
                 chosen = chosen.assign(r_gain=table.r_gain)
-            row = {"method": script, "variable": variable, "seeds": len(table), "paper_r": published[its_name]}
+            row = row_of(key, len(table)) | {"variable": variable, "paper_r": published[its_name]}
             rows.append(row | over_seeds(chosen) | pair_effects(pairs, variable))
     return pd.DataFrame(rows)

@@ -40,7 +40,7 @@ def make(results) -> pd.DataFrame:
                                                   "noise_violations_percent")]  # fmt: skip
     rows = []
     for key, replicates in results.rows.items():
-        if not any(job.script == key[0] and job.steps for job in results.jobs):
+        if not results.is_trained(key):
             continue
         table = pd.DataFrame([violations(one) for one in replicates], columns=names).astype(float)
         row = row_of(key, len(table)) | over_seeds(table.drop(columns="pairs")) | {"pairs": table.pairs.mean()}

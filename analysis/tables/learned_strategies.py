@@ -4,15 +4,13 @@ import pandas as pd
 
 from analysis.experiments import HEURISTICS, METHODS
 from analysis.results import METHODS as PAPER_NAMES
-from analysis.tables.common import mean_of_years, over_seeds, paper
+from analysis.tables.common import ROW_COLUMNS, mean_of_years, over_seeds, paper, row_of
 
 TITLE = "Learned strategies"
 YEARS = {"density_stems_ha": "density", "conifer_fraction": "conifer_fraction", "planted_stems_ha": "planted",
          "thinned_stems_ha": "thinned", "max_lai": "max_lai", "winter_albedo": "winter_albedo",
          "boundary_warming_mj_m2": "warming"}  # fmt: skip
-COLUMNS = {
-    "method": "method",
-    "seeds": "seeds",
+COLUMNS = ROW_COLUMNS | {
     "density": "density (stems/ha)",
     "final_density": "density, last year",
     "paper_density": "density (paper)",
@@ -37,19 +35,20 @@ def numbers(one) -> dict:
     row = {YEARS[name]: value for name, value in mean_of_years(one, list(YEARS)).items()}
     years = one.years(["density_stems_ha", "conifer_fraction"])
     last = years[years.year == years.year.max()].groupby("variable")["mean"].mean()
-    row |= {"final_density": last.density_stems_ha, "final_conifer_fraction": last.conifer_fraction}
+    # a run that was evaluated at none of the kept weights has no years here
+    row |= {"final_density": last.get("density_stems_ha"), "final_conifer_fraction": last.get("conifer_fraction")}
     return row | {"carbon": one.evaluation.carbon_return.mean(), "thaw": one.evaluation.thaw_return.mean()}
 
 
 def make(results) -> pd.DataFrame:
-    """One row per method; the annual record is of the weights 0, 0.5 and 1."""
+    """One row per method, those of one's own last; the annual record is of the weights 0, 0.5 and 1."""
     published = paper("learned_strategies", index_col="method").add_prefix("paper_")
-    columns = [name for name in COLUMNS if name not in ("method", "seeds") and not name.startswith("paper_")]
+    columns = [name for name in COLUMNS if name not in ROW_COLUMNS and not name.startswith("paper_")]
     rows = []
-    for script in (*METHODS, *HEURISTICS):
-        table = pd.DataFrame([numbers(one) for one in results.of("main", script)], columns=columns).astype(float)
-        row = {"method": script, "seeds": len(table)} | over_seeds(table)
-        if PAPER_NAMES[script] in published.index:
-            row |= published.loc[PAPER_NAMES[script]].to_dict()
+    for key, replicates in results.of_main_and_others((*METHODS, *HEURISTICS)).items():
+        table = pd.DataFrame([numbers(one) for one in replicates], columns=columns).astype(float)
+        row = row_of(key, len(table)) | over_seeds(table)
+        if PAPER_NAMES.get(key[0]) in published.index:
+            row |= published.loc[PAPER_NAMES[key[0]]].to_dict()
         rows.append(row)
     return pd.DataFrame(rows)
