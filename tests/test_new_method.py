@@ -19,10 +19,10 @@ def block(language):
 def test_the_followed_example(tmp_path):
     script, changed = (ROOT / "cleanrl_style" / "ppo_gated.py").read_text(encoding="utf-8"), 0
     for hunk in block("diff").strip("\n").split("\n\n"):
-        old = [line[1:] for line in hunk.split("\n") if line.startswith("-")]
-        new = [line[1:] for line in hunk.split("\n") if line.startswith("+")]
-        assert script.count("\n".join(old) + "\n") == 1, old
-        script, changed = script.replace("\n".join(old) + "\n", "\n".join(new) + "\n"), changed + len(old) + len(new)
+        old, new = ["".join(f"{line[1:]}\n" for line in hunk.split("\n") if line[0] in kept) for kept in (" -", " +")]
+        assert script.count(old) == 1, old
+        script = script.replace(old, new)
+        changed += sum(line[0] in "-+" for line in hunk.split("\n"))
     assert f"says {changed}:" in PAGE
     path = tmp_path / "ppo_group.py"
     path.write_text(script, encoding="utf-8")
