@@ -218,14 +218,14 @@ def page(table: pd.DataFrame) -> str:
     site = moved.factor.isin(sim.SITE_PARAMETERS)
     constant = moved.factor.isin(sim.CONSTANTS)
     returns, conflict = ("zero_carbon", "zero_thaw"), ("species_carbon", "species_thaw")
-    spans = "; ".join(f"`{name}`: {SHARE * span:g}, a tenth of {what} ({span:g})"
-                      for name, (span, what) in SPANS.items())  # fmt: skip
+    spans = ";\n".join(f"`{name}`: {SHARE * span:g}, a tenth of {what} ({span:g})"
+                       for name, (span, what) in SPANS.items())  # fmt: skip
     defaults = "\n".join(f"| `{name}` | {meaning} | {default[name]:+.2f} |" for name, meaning in MEASURES.items())
     return f"""# What the results hang on
 
 Written by `python analysis/sensitivity.py`; not to be edited. Every site parameter at the low and the high end of its
 sampled range, and every literature constant {SHARE:.0%} below and above its value, one at a time: 50-year returns on
-{SITES} sites that span what is sampled, {WEATHERS} weathers each, everything else held, the dice included. The sites
+{SITES} sites that span what is sampled (weathers on each: {WEATHERS}), everything else held, the dice included. The sites
 start with their own stands. Planting is 100 stems/ha a year wherever that can be done. What was measured:
 
 | | | at the default |
@@ -235,7 +235,9 @@ start with their own stands. Planting is 100 stems/ha a year wherever that can b
 The tables below give how far each factor moves these: the measure at the high value less that at the low one.
 Constants stop at their physical limits and half way to a constant that they have to stay below; then the step is
 smaller, as the two columns show; an empty cell is the default. Where zero is arbitrary, {SHARE:.0%} would mean nothing
-and the step is: {spans} (for the constants of that unit, or whose name begins so). The mean annual temperature follows
+and the step (for the constants of that unit, or whose name begins so) is
+{spans}.
+The mean annual temperature follows
 the latitude, as it does when a site is sampled. A range and {SHARE:.0%} are not alike: compare parameters with
 parameters and constants with constants.
 

@@ -34,8 +34,8 @@ def run_block(
     """
     number = len(parameters)
     lanes = LANES if number > 1 else 1
-    block = np.zeros(1, block_dtype(lanes))
-    rows = block.view("f8").reshape(-1, lanes)
+    rows = np.zeros((block_dtype(lanes).itemsize // (8 * lanes), lanes))
+    block = np.ndarray(1, block_dtype(lanes), buffer=rows)
     fill = np.minimum(np.arange(lanes), number - 1)
     first = 0
     for values in (parameters, state, draws):
