@@ -91,9 +91,12 @@ def main(run_dir: Path | None = None, preference: float = 0.5, images: Path = Pa
     images.mkdir(parents=True, exist_ok=True)
     if run_dir is None:
         stand().save(images / "stand.png")
-        heuristic = frames(lambda observations, *_: conifer_restoration.policy(observations), "boreal-generalist-v0",
-                           preference)  # fmt: skip
-        save_animation(images / "conifer_restoration.gif", heuristic)
+
+        def heuristic(observations, masks, accrued_returns):
+            return conifer_restoration.policy(observations, masks)
+
+        pictures = frames(heuristic, "boreal-generalist-v0", preference)
+        save_animation(images / "conifer_restoration.gif", pictures)
     else:
         save_animation(images / "trained_policy.gif", frames(*trained_policy(run_dir), preference))
 

@@ -30,15 +30,15 @@ class Args:
 
 
 def reference_policies() -> dict:
-    """Name -> function of observations (n, d) that gives actions (n,)."""
-    constant = {f"action {a}": lambda observations, a=a: where_valid(observations, a) for a in range(25)}
+    """Name -> function of observations (n, d) and masks (n, 25) that gives actions (n,)."""
+    constant = {f"action {a}": lambda observations, masks, a=a: where_valid(masks, a) for a in range(25)}
     strategies = (zero_change, plus_100, target_density, conifer_restoration)
     return constant | {strategy.__name__.rsplit(".")[-1]: strategy.policy for strategy in strategies}
 
 
-def where_valid(observations: np.ndarray, action: int) -> np.ndarray:
-    """The action where it can be carried out in full, no change elsewhere; observations (n, d), actions (n,)."""
-    return np.where(boreal_env.action_masks(observations)[:, action], action, boreal_env.NO_CHANGE)
+def where_valid(masks: np.ndarray, action: int) -> np.ndarray:
+    """The action where it can be carried out in full, no change elsewhere; masks (n, 25), actions (n,)."""
+    return np.where(masks[:, action], action, boreal_env.NO_CHANGE)
 
 
 def play(args: Args, **reward) -> np.ndarray:
@@ -50,7 +50,7 @@ def play(args: Args, **reward) -> np.ndarray:
     for policy in reference_policies().values():
         observations, _ = envs.reset(seed=seeds)
         for _ in range(args.years):
-            observations, _, _, _, infos = envs.step(policy(observations))
+            observations, _, _, _, infos = envs.step(policy(observations, envs.action_masks()))
         years = [final_info(infos, site, ["years"])["years"] for site in range(args.sites)]
         sums.append([[record[name].sum() for name in columns] for record in years])
     return np.array(sums)

@@ -1,0 +1,18 @@
+import numpy as np
+
+from analysis import measure_balance
+
+
+def test_the_measured_scale_equalises_the_spreads(capsys):
+    args = measure_balance.Args(sites=2, years=3)
+    sums = measure_balance.play(args)
+    assert sums.shape == (29, 2, 3) and np.isfinite(sums).all()
+    change, _, thaw = measure_balance.within_site_spread(sums)
+    measure_balance.main(args)
+    assert f"balanced carbon_scale: {change / thaw:.4f}" in capsys.readouterr().out
+
+
+def test_actions_that_are_not_valid_become_no_change():
+    masks = np.zeros((2, 25), dtype=bool)
+    masks[0, 24] = True
+    assert measure_balance.where_valid(masks, 24).tolist() == [24, 12]
