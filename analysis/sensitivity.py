@@ -225,8 +225,8 @@ def page(table: pd.DataFrame) -> str:
 
 Written by `python analysis/sensitivity.py`; not to be edited. Every site parameter at the low and the high end of its
 sampled range, and every literature constant {SHARE:.0%} below and above its value, one at a time: 50-year returns on
-{SITES} sites that span what is sampled (weathers on each: {WEATHERS}), everything else held, the dice included. The sites
-start with their own stands. Planting is 100 stems/ha a year wherever that can be done. What was measured:
+{SITES} sites that span what is sampled (weathers on each: {WEATHERS}), everything else held, the dice included. The
+sites start with their own stands. Planting is 100 stems/ha a year wherever that can be done. What was measured:
 
 | | | at the default |
 |---|---|---|
