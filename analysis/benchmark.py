@@ -172,25 +172,28 @@ def environment(args: Args, stack: ExitStack) -> list[Measurement]:
     pool = stack.enter_context(ThreadPoolExecutor(available_cores()))
     make = partial(gym.make, "boreal-generalist-v0", disable_env_checker=True, years=1000)
     asynchronous = partial(gym.vector.AsyncVectorEnv, autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
-    kinds = [("plain loop", 1, make)]
-    kinds += [("async", n, lambda n=n: asynchronous([make] * n)) for n in ((2,) if args.quick else (1, 2, 4, 8, 16))]
-    sizes = (1, 32) if args.quick else (1, 2, 4, 8, 16, 32, 64)
-    kinds += [("lockstep", n, lambda n=n: boreal_env.BorealVectorEnv(n, years=1000)) for n in sizes]
+    sizes = (1, 2, 32) if args.quick else (1, 2, 4, 8, 16, 32, 64)
+    processes = (2,) if args.quick else sizes
+    kinds = [("plain loop", n, lambda n=n: [make() for _ in range(n)]) for n in sizes]
+    kinds += [("async", n, lambda n=n: [asynchronous([make] * n)]) for n in processes]
+    kinds += [("lockstep", n, lambda n=n: [boreal_env.BorealVectorEnv(n, years=1000)]) for n in sizes]
 
-    def measure(name, number, env, groups):
+    def measure(name, number, envs, groups):
         action = boreal_env.NO_CHANGE if name == "plain loop" else np.full(number, boreal_env.NO_CHANGE)
-        step = seconds(lambda: [env.step(action) for _ in range(years)]) / years
-        physics = sum(physics_alone(groups, pool) for _ in range(years)) / years
+        step = seconds(lambda: [env.step(action) for _ in range(years) for env in envs]) / years
+        one_by_one = [[group] for group in groups] if name == "plain loop" else [groups]
+        physics = sum(physics_alone(these, pool) for _ in range(years) for these in one_by_one) / years
         what = f"{name}, {counted(number, 'stand')}"
         return {(what, "years per s"): number / step, (what, "% not physics"): 100.0 * (1.0 - physics / step)}
 
     measurements = []
     for name, number, factory in kinds:
-        env = factory()
-        stack.callback(env.close)
-        env.reset(seed=0)
+        envs = factory()
+        for env in envs:
+            stack.callback(env.close)
+            env.reset(seed=0)
         groups = [started(number)] if name == "lockstep" else [started(1) for _ in range(number)]
-        measurements.append(partial(measure, name, number, env, groups))
+        measurements.append(partial(measure, name, number, envs, groups))
     return measurements
 
 
