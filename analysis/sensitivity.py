@@ -241,6 +241,10 @@ The mean annual temperature follows
 the latitude, as it does when a site is sampled. A range and {SHARE:.0%} are not alike: compare parameters with
 parameters and constants with constants.
 
+Where the thaw reward is clipped at -1 in every year, as at one of the four sites, its effects are nearly zero,
+and means over sites are smaller for it. Nothing burned in the one weather: zeros of fire's parameters say nothing about
+how much they matter. There are no error estimates: read sizes and ranks, not second digits.
+
 ## Alternatives
 
 Published values other than ours, and ours with the crowns of both species alike; effects are against the default.
