@@ -50,7 +50,8 @@ def draw_front(ax, front: pd.DataFrame, title: str):
     )
     if front.clipped_thaw_years.min() > 0.99 * YEARS:
         ax.set_ylim(-1.0, 1.0)
-        ax.text(0.5, 0.8, "thaw reward clipped\nat −1 in nearly every year", transform=ax.transAxes, ha="center", fontsize=7)
+        words = "thaw reward clipped\nat −1 in nearly every year"
+        ax.text(0.5, 0.8, words, transform=ax.transAxes, ha="center", fontsize=7)
     ax.set_title(title, fontsize=8)
     ax.tick_params(labelsize=7)
     return points

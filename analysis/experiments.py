@@ -172,15 +172,18 @@ def controls(seeds) -> list[Job]:
 
 
 def variants(seeds) -> list[Job]:
-    """Gated PPO with one choice changed, and both of those that balance the objectives."""
+    """Gated PPO with one choice changed, and two of them together; EUPG with smaller batches, or rewards to come."""
     changes = (
-        {"reward_scales": REWARD_SCALES},
-        {"per_objective_advantages": True},
-        {"reward_scales": REWARD_SCALES, "per_objective_advantages": True},
-        {"hide_site": True},
-        {"learning_rate": 1e-3},
+        ("ppo_gated", {"reward_scales": REWARD_SCALES}),
+        ("ppo_gated", {"per_objective_advantages": True}),
+        ("ppo_gated", {"ent_coef": 0.0}),
+        ("ppo_gated", {"ent_coef": 0.0, "per_objective_advantages": True}),
+        ("ppo_gated", {"hide_site": True}),
+        ("ppo_gated", {"learning_rate": 1e-3}),
+        ("eupg_var_lambda", {"num_envs": 8}),
+        ("eupg_var_lambda", {"utility": "future"}),
     )
-    return [trained("variants", "ppo_gated", seed, **change) for change in changes for seed in seeds_of(3, seeds)]
+    return [trained("variants", script, seed, **change) for script, change in changes for seed in seeds_of(3, seeds)]
 
 
 def mechanisms(seeds) -> list[Job]:

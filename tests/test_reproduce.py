@@ -13,7 +13,7 @@ from analysis import experiments, protocol, reproduce, runs
 from analysis.experiments import Job
 from cleanrl_style.ppo_gated import Args
 
-COUNTS = {"main": 36, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 25, "variants": 15,
+COUNTS = {"main": 36, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 25, "variants": 24,
           "mechanisms": 2}
 
 
