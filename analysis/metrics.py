@@ -83,6 +83,7 @@ def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame) -> pd.DataFrame:
                          f"(nor on {len(missing) - 1} others); evaluate both with the same --eval-episodes")
     difference = evaluation.copy()
     difference[OBJECTIVES] -= reference.loc[evaluation.seed].to_numpy()
+    difference["scalarized_return"] = scalarize(*difference[OBJECTIVES].to_numpy().T, difference.preference)
     return difference
 
 

@@ -107,6 +107,7 @@ def test_gains_subtract_zero_change_on_the_same_episode():
     gains = metrics.gains(ours, zero_change)
     assert gains.carbon_return.tolist() == [1, 2, 1, 2]
     assert gains.thaw_return.tolist() == [0, 1, 2, 3]
+    assert gains.scalarized_return.tolist() == [0, 2, 2, 2]  # thaw at preference 0, carbon at 1, in turn
     with pytest.raises(ValueError, match="seed 1"):
         metrics.gains(ours, zero_change[zero_change.seed == 0])
 
