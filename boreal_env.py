@@ -167,8 +167,8 @@ def action_masks(observations: np.ndarray, harvest_min_class: str = "young") -> 
     observations = np.atleast_2d(np.asarray(observations, dtype=float))
     if observations.ndim != 2 or observations.shape[1] not in (_SITE.start, _SITE.stop):
         raise ValueError(
-            f"observations of shape {observations.shape}: (n, {_SITE.start}) or (n, {_SITE.stop}), all groups of a mode,"
-            " are allowed; env.action_masks() works with any observation_groups"
+            f"observations of shape {observations.shape}: (n, {_SITE.start}) or (n, {_SITE.stop}), all groups of a mode"
+            ", are allowed; env.action_masks() works with any observation_groups"
         )
     if not np.isfinite(observations[:, 2]).all() or not np.isfinite(observations[:, _AGE]).all():
         raise ValueError("observations: finite densities and age fractions are allowed, got NaN or infinity")
@@ -615,7 +615,7 @@ def check_preference(value, what: str = "preference") -> float:
     number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
     if not number or not 0.0 <= value <= 1.0:
         raise ValueError(f"{what}: a number in [0, 1] is allowed, got {value!r}")
-    return abs(float(value))  # of -0.0
+    return abs(float(value))  # 0.0 for -0.0
 
 
 def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict:

@@ -13,7 +13,6 @@ import tyro
 import boreal_env
 from boreal_env import OBSERVATION, BorealEnv, BorealVectorEnv, Objective, Observed, Reward
 
-
 #: Key of the last step's info -> (unit, meaning).
 FINAL_INFO = {
     "carbon_return": ("1", "sum of the carbon rewards"),
