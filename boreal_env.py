@@ -394,7 +394,6 @@ def objective_names(objectives: Sequence) -> list[str]:
 # ---------------------------------------------------------------------------------------------------------------
 
 
-
 class _Episodes:
     """`number` episodes side by side. Arguments are those of `BorealEnv`, checked here."""
 
@@ -493,7 +492,6 @@ class _Episodes:
             stopped = int(np.argmin(self.running))
             raise RuntimeError(f"step on episode {stopped} that is not running: call reset first")
         actions = check_actions(actions, self.number)
-        before = self.conifer_fraction()
         record = self.stands.step(actions)
         parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
         columns = dict(zip(sim.RECORD_NAMES, record.T, strict=True)) | parts
@@ -502,7 +500,7 @@ class _Episodes:
         self.history[np.arange(self.number), self.year] = np.column_stack([columns[n] for n in self.history_names])
         self.year = self.year + 1
         self.running = self.year < self.years
-        self._observe_year(record, actions, before, parts)
+        self._observe_year(record, actions, parts)
         return np.stack([columns[f"{name}_reward"] for name in self.objective_names], axis=1).astype(np.float32)
 
     def observations(self) -> np.ndarray:
@@ -521,10 +519,6 @@ class _Episodes:
         if fresh.any():
             raise RuntimeError(f"{what} of episode {int(np.argmax(fresh))} that has not begun: call reset first")
 
-    def conifer_fraction(self) -> np.ndarray:
-        """Conifers among the stems now, shape (number,)."""
-        return self._observation[:, 3].copy()
-
     def final_info(self, i: int) -> dict:
         """Totals of a finished episode."""
         years = dict(zip(self.history_names, self.history[i, : self.year[i]].T, strict=True))
@@ -542,9 +536,7 @@ class _Episodes:
             "mean_density": mean("density_stems_ha"),
             "final_conifer_fraction": float(years["conifer_fraction"][-1]),
             "mean_conifer_fraction": mean("conifer_fraction"),
-            "growing_season_days": mean("growing_season_days"),
-            "latent_heat_mj_m2": mean("latent_heat_mj_m2"),
-            "ground_shortwave_mj_m2": mean("ground_shortwave_mj_m2"),
+            **{name: mean(name) for name in ("growing_season_days", "latent_heat_mj_m2", "ground_shortwave_mj_m2")},
         }
         if self.record_years:
             record = {name: column.copy() for name, column in years.items()}
@@ -564,23 +556,22 @@ class _Episodes:
         scaled[:, _SITE] = [sim.scale_site(site) for site in sites]
         self._observation[indices] = scaled
 
-    def _observe_year(self, record, actions, conifers_before, components) -> None:
+    def _observe_year(self, record, actions, components) -> None:
         """Observation after a year; what was last year's becomes the year before's."""
         column = {name: record[:, i] for name, i in _COLUMN.items()}
-        older = self._observation[:, [11, 13, 15]].copy()
         values = np.zeros((self.number, len(OBSERVATION)))
         values[:, 1] = self.year
         for i, name in _RECORDED.items():
             values[:, i] = column[name]
         values[:, 24], values[:, 25] = actions // 5, actions % 5
         values[:, 26] = column["planted_stems_ha"] - column["thinned_stems_ha"]
-        values[:, 27] = column["conifer_fraction_after_action"] - conifers_before
+        values[:, 27] = column["conifer_fraction_after_action"] - self._observation[:, 3]
         values[:, _PENALTIES] = np.stack([components[name] for name in OBSERVATION_NAMES[_PENALTIES]], axis=1)
         self._fill_stand(values, self.stands.stocks(np.arange(self.number)))
         scaled = (values + _SHIFT) / _SCALE
         scaled[:, 5:11] = self._observation[:, 5:11]
         scaled[:, _SITE] = self._observation[:, _SITE]
-        scaled[:, [12, 14, 16]] = older
+        scaled[:, [12, 14, 16]] = self._observation[:, [11, 13, 15]]
         self._observation = scaled
 
     @staticmethod

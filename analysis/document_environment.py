@@ -18,7 +18,8 @@ FINAL_INFO = {
     "carbon_return": ("1", "sum of the carbon rewards"),
     "thaw_return": ("1", "sum of the thaw rewards; `<name>_return` of each objective of your own"),
     "site_seed": ("", "the site is `sim.sample_site(site_seed)` before `parameter_overrides` and the option `site`; "
-                      "-1: the middle of every range (site-specific mode without a `site_seed`)"),
+                      "in site-specific mode without temperature noise, and -1, the middle of every range, if no "
+                      "`site_seed` is given"),
     "episode_seed": ("", "of the start, the weather and the dice, as in `sim.simulate(seed=)`; in site-specific mode "
                          "the `site_seed`, 0 without one"),
     "preference": ("1", "weight of carbon that was observed"),

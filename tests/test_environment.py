@@ -857,6 +857,15 @@ def test_planting_up_to_the_limit_costs_the_density_penalty_whatever_the_mix():
     assert (np.concatenate(years["density_penalty"]) == 1.0).all()
 
 
+def test_planting_that_ends_just_below_the_limit_costs_nothing():
+    env = quick(years=1, record_years=True, initial_ranges={"density_stems_ha": (1899.99, 1899.99)})
+    env.reset(seed=1)
+    assert env.action_masks()[24]
+    years = env.step(24)[4]["years"]
+    assert years["density_after_action"][0] == pytest.approx(1999.99, abs=1e-9)
+    assert years["density_penalty"][0] == years["ineffective_penalty"][0] == 0.0
+
+
 def test_masks_of_nan_are_refused():
     observations = np.zeros((2, 43))
     observations[1, INDEX["density"]] = NAN
