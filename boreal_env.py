@@ -5,7 +5,7 @@ The file reads top to bottom: observation, action mask, reward, episodes, the en
 """
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from numbers import Real
 
 import gymnasium as gym
@@ -27,7 +27,7 @@ from sim.management import (
     NUM_ACTIONS,
     check_actions,
 )
-from sim.parameters import check_seed
+from sim.parameters import check_overrides, check_seed
 from sim.spin_up import check_initial_ranges
 
 MODES = ("generalist", "site_specific")
@@ -121,7 +121,18 @@ _SCALE = np.array([entry.scale for entry in OBSERVATION])
 _AGE = slice(OBSERVATION_NAMES.index("conifer_seedling"), OBSERVATION_NAMES.index("deciduous_old") + 1)
 _PENALTIES = slice(OBSERVATION_NAMES.index("biomass_limit_penalty"), OBSERVATION_NAMES.index("density_penalty") + 1)
 _SITE = slice(OBSERVATION_NAMES.index(f"site_{next(iter(sim.SITE_PARAMETERS))}"), len(OBSERVATION))
+_CLIMATE = (
+    "latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c", "growth_start_day", "fall_start_day"
+)  # fmt: skip
 _COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
+
+
+#: Entries of the observation that are columns of the annual record, by index.
+_RECORDED = {
+    11: "fire_mortality", 13: "insect_mortality", 15: "drought_index", 17: "biomass_change_kgc_m2",
+    18: "soil_change_kgc_m2", 19: "net_carbon_change_kgc_m2", 20: "mortality_kgc_m2", 21: "litterfall_kgc_m2",
+    22: "harvest_kgc_m2", 23: "hwp_stored_kgc_m2",
+}  # fmt: skip
 
 
 def observation_space(entries: Sequence[int], largest_penalties: Sequence[float] = (0.0, 0.0, 0.0)) -> Box:
@@ -149,13 +160,16 @@ def sample_site_observations(site_seeds: Sequence[int]) -> np.ndarray:
 def action_masks(observations: np.ndarray, harvest_min_class: str = "young") -> np.ndarray:
     """Valid actions of observations: those whose whole density change can be made, and so cost no penalty.
 
-    observations : (n, 43 or more), as the environment gives them; harvest_min_class : "young", "mature" or "old".
-    Returns bool, shape (n, 25).
+    observations : (n, 43) or (n, 105), all groups of a mode; a reduced observation does not say which columns it has,
+    but `env.action_masks()` knows. harvest_min_class : "young", "mature" or "old". Returns bool, shape (n, 25).
     """
     _check_choice("harvest_min_class", harvest_min_class, AGE_CLASSES[2:])
     observations = np.atleast_2d(np.asarray(observations, dtype=float))
-    if observations.ndim != 2 or observations.shape[1] < _AGE.stop:
-        raise ValueError(f"observations of shape {observations.shape}: (n, {_AGE.stop} or more) is allowed")
+    if observations.ndim != 2 or observations.shape[1] not in (_SITE.start, _SITE.stop):
+        raise ValueError(
+            f"observations of shape {observations.shape}: (n, {_SITE.start}) or (n, {_SITE.stop}), all groups of a mode"
+            ", are allowed; env.action_masks() works with any observation_groups"
+        )
     if not np.isfinite(observations[:, 2]).all() or not np.isfinite(observations[:, _AGE]).all():
         raise ValueError("observations: finite densities and age fractions are allowed, got NaN or infinity")
     density = observations[:, 2] * 1500.0
@@ -180,6 +194,12 @@ def valid_actions(density: np.ndarray, harvestable: np.ndarray) -> np.ndarray:
 # ---------------------------------------------------------------------------------------------------------------
 # Reward: [carbon, thaw]
 # ---------------------------------------------------------------------------------------------------------------
+
+
+#: Carbon scale [kgC m-2 yr-1] at which both returns vary equally between policies of one site, as measured by
+#: `analysis/measure_balance.py`.
+BALANCED_CARBON_SCALE = 1.4
+ROUND_OFF_STEMS = 1e-6  # stems ha-1; planting up to the limit reaches it but for less
 
 
 @dataclass(frozen=True)
@@ -217,17 +237,18 @@ class Reward:
         return self.limit_penalty * biomass, self.limit_penalty * soil, self.density_penalty
 
     @staticmethod
-    def of(values) -> "Reward":
-        """A Reward from a Reward, a dict of constants to change, or None."""
+    def of(values, balanced: bool = False) -> "Reward":
+        """A Reward from a Reward, a dict of constants to change, or None; balanced : from which carbon scale."""
+        default = Reward(carbon_scale=BALANCED_CARBON_SCALE) if balanced else Reward()
         if values is None or isinstance(values, Reward):
-            return values or Reward()
+            return values or default
         if not isinstance(values, dict):
             raise ValueError(f"reward: a Reward or a dict of its constants is allowed, got {type(values).__name__}")
         allowed = [field.name for field in fields(Reward)]
         unknown = [name for name in values if name not in allowed]
         if unknown:
             raise ValueError(f"unknown reward constant {unknown[0]!r}; allowed: {', '.join(allowed)}")
-        return replace(Reward(), **values)
+        return replace(default, **values)
 
 
 def reward_components(record: np.ndarray, density_change: np.ndarray, reward: Reward) -> dict[str, np.ndarray]:
@@ -248,6 +269,7 @@ def reward_components(record: np.ndarray, density_change: np.ndarray, reward: Re
     unclipped = change + reward.stock_bonus * stock + reward.product_bonus * products
     over_biomass = np.maximum(column["biomass_kgc_m2"] - reward.biomass_limit, 0.0)
     over_soil = np.maximum(column["soil_kgc_m2"] - reward.soil_limit, 0.0)
+    crowded = column["density_after_action"] >= reward.density_limit - ROUND_OFF_STEMS
     made = column["planted_stems_ha"] - column["thinned_stems_ha"]
     shortfall = np.abs(density_change - made)
     missed = np.where(shortfall < NEGLIGIBLE_STEMS, 0.0, shortfall / np.maximum(np.abs(density_change), 1.0))
@@ -256,7 +278,7 @@ def reward_components(record: np.ndarray, density_change: np.ndarray, reward: Re
         "components_clipped": unclipped - sum(gains.values()),
         "biomass_limit_penalty": reward.limit_penalty * over_biomass / reward.biomass_limit,
         "soil_limit_penalty": reward.limit_penalty * over_soil / reward.soil_limit,
-        "density_penalty": reward.density_penalty * (column["density_after_action"] >= reward.density_limit),
+        "density_penalty": reward.density_penalty * crowded,
         "ineffective_penalty": reward.ineffective_penalty * missed,
     }
 
@@ -315,10 +337,10 @@ PAPER_OBJECTIVES = ("carbon", "thaw")
 class Objective:
     """An objective of your own, beside the paper's "carbon" and "thaw".
 
-    value : function of the year's record, a dict of the columns `HISTORY_NAMES`, each (n,), to rewards (n,); for
-    worker processes and pickling, a function at the top level of a module. low, high : limits of the reward; values
-    are clipped to them. The record gets the columns `<name>_reward` and `<name>_clipped` (what was cut off), the last
-    step's info `<name>_return`.
+    value : function of the year's record to rewards (n,). The record is a dict of read-only columns (n,): those of
+    `HISTORY_NAMES` and of objectives before this one. For worker processes and pickling, a function at the top level
+    of a module. low, high : limits of the reward; values are clipped to them. The record gets the columns
+    `<name>_reward` and `<name>_clipped` (what was cut off), the last step's info `<name>_return`.
     """
 
     name: str
@@ -338,7 +360,10 @@ class Objective:
 
     def columns(self, year: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """`<name>_clipped` and `<name>_reward` of a year, each shape (n,)."""
-        value = np.asarray(self.value(year), dtype=float)
+        shown = {name: column.view() for name, column in year.items()}
+        for column in shown.values():
+            column.flags.writeable = False
+        value = np.asarray(self.value(shown), dtype=float)
         number = len(year["carbon_reward"])
         if value.shape != (number,) or not np.isfinite(value).all():
             raise ValueError(f"objective {self.name}: {number} finite numbers are allowed, got {value}")
@@ -369,14 +394,13 @@ def objective_names(objectives: Sequence) -> list[str]:
 # ---------------------------------------------------------------------------------------------------------------
 
 
-
 class _Episodes:
     """`number` episodes side by side. Arguments are those of `BorealEnv`, checked here."""
 
     def __init__(
         self, number, *, mode="generalist", years=DEFAULT_YEARS, time_step_minutes=30, backend="numba",
         thaw_formulation="asymmetric", fixed_preference=None, site_seed=None, parameter_overrides=None,
-        initial_ranges=None, hwp_half_life_years=None, harvest_min_class="young", reward=None,
+        initial_ranges=None, hwp_half_life_years=None, harvest_min_class="young", reward=None, balanced=False,
         objectives=PAPER_OBJECTIVES, mechanisms=None, constants=None, observation_groups=None, record_years=False,
     ):  # fmt: skip
         _check_choice("mode", mode, MODES)
@@ -384,18 +408,19 @@ class _Episodes:
         if isinstance(years, bool) or not isinstance(years, (int, np.integer)) or not 1 <= years <= 1000:
             raise ValueError(f"years: an integer in [1, 1000] is allowed, got {years!r}")
         if fixed_preference is not None:
-            fixed_preference = check_preference(fixed_preference)
+            fixed_preference = check_preference(fixed_preference, "fixed_preference")
         if site_seed is not None:
             check_seed("site_seed", site_seed)
-        if not isinstance(record_years, (bool, np.bool_)):
-            raise ValueError(f"record_years: True or False is allowed, got {record_years!r}")
+        for name, value in (("balanced", balanced), ("record_years", record_years)):
+            if not isinstance(value, (bool, np.bool_)):
+                raise ValueError(f"{name}: True or False is allowed, got {value!r}")
         self.number, self.mode, self.years = number, mode, int(years)
         self.thaw_formulation, self.fixed_preference = thaw_formulation, fixed_preference
         sim.middle_site(parameter_overrides)
         self.site_seed, self.parameter_overrides = site_seed, dict(parameter_overrides or {})
         self.initial_ranges = check_initial_ranges(initial_ranges)
         self.harvest_min_class = harvest_min_class
-        self.reward = Reward.of(reward)
+        self.reward = Reward.of(reward, bool(balanced))
         objectives = check_objectives(objectives)
         self.objective_names = objective_names(objectives)
         self.own_objectives = [objective for objective in objectives if isinstance(objective, Objective)]
@@ -414,11 +439,14 @@ class _Episodes:
         groups = OBSERVATION_GROUPS if observation_groups is None else tuple(observation_groups)
         for group in groups:
             _check_choice("observation group", group, OBSERVATION_GROUPS)
+        if len(set(groups)) < len(groups):
+            raise ValueError(f"observation_groups {', '.join(groups)}: each is allowed once")
         if mode == "site_specific":
             groups = tuple(group for group in groups if group != "site")
         self.entries = [i for i, entry in enumerate(OBSERVATION) if entry.group in groups]
         if not self.entries:
             raise ValueError(f"observation_groups = {observation_groups!r}: nothing is left to observe in mode {mode}")
+        self.observation_names = tuple(OBSERVATION_NAMES[i] for i in self.entries)
         self.observation_space = observation_space(self.entries, self.reward.largest_penalties())
         self.preference = np.zeros(number)
         self.site_seeds = np.zeros(number, dtype=np.int64)
@@ -464,7 +492,6 @@ class _Episodes:
             stopped = int(np.argmin(self.running))
             raise RuntimeError(f"step on episode {stopped} that is not running: call reset first")
         actions = check_actions(actions, self.number)
-        before = self.conifer_fraction()
         record = self.stands.step(actions)
         parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
         columns = dict(zip(sim.RECORD_NAMES, record.T, strict=True)) | parts
@@ -473,7 +500,7 @@ class _Episodes:
         self.history[np.arange(self.number), self.year] = np.column_stack([columns[n] for n in self.history_names])
         self.year = self.year + 1
         self.running = self.year < self.years
-        self._observe_year(record, actions, before, parts)
+        self._observe_year(record, actions, parts)
         return np.stack([columns[f"{name}_reward"] for name in self.objective_names], axis=1).astype(np.float32)
 
     def observations(self) -> np.ndarray:
@@ -492,10 +519,6 @@ class _Episodes:
         if fresh.any():
             raise RuntimeError(f"{what} of episode {int(np.argmax(fresh))} that has not begun: call reset first")
 
-    def conifer_fraction(self) -> np.ndarray:
-        """Conifers among the stems now, shape (number,)."""
-        return self._observation[:, 3].copy()
-
     def final_info(self, i: int) -> dict:
         """Totals of a finished episode."""
         years = dict(zip(self.history_names, self.history[i, : self.year[i]].T, strict=True))
@@ -513,9 +536,7 @@ class _Episodes:
             "mean_density": mean("density_stems_ha"),
             "final_conifer_fraction": float(years["conifer_fraction"][-1]),
             "mean_conifer_fraction": mean("conifer_fraction"),
-            "growing_season_days": mean("growing_season_days"),
-            "latent_heat_mj_m2": mean("latent_heat_mj_m2"),
-            "ground_shortwave_mj_m2": mean("ground_shortwave_mj_m2"),
+            **{name: mean(name) for name in ("growing_season_days", "latent_heat_mj_m2", "ground_shortwave_mj_m2")},
         }
         if self.record_years:
             record = {name: column.copy() for name, column in years.items()}
@@ -524,51 +545,33 @@ class _Episodes:
 
     def _observe_start(self, indices, sites) -> None:
         """Observation of a fresh stand: history of an unchanged one."""
-        for i, site in zip(indices, sites, strict=True):
-            row = self._observation[i]
-            row[:] = 0.0
-            row[5:8] = [site[n] for n in ("latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c")]
-            row[8], row[9] = site["growth_start_day"], site["fall_start_day"]
-            row[10] = row[9] - row[8]
-            row[24] = DENSITY_CHANGES.index(0.0)
-            row[5:11] = (row[5:11] + _SHIFT[5:11]) / _SCALE[5:11]
-            row[_SITE] = sim.scale_site(site)
         stocks = self.stands.stocks(indices)
         values = np.zeros((len(indices), len(OBSERVATION)))
+        values[:, 5:10] = [[site[name] for name in _CLIMATE] for site in sites]
+        values[:, 10] = values[:, 9] - values[:, 8]
         values[:, 24] = DENSITY_CHANGES.index(0.0)
         values[:, 25] = np.abs(stocks["conifer_fraction"][:, None] - np.array(CONIFER_MIXES)).argmin(axis=1)
         self._fill_stand(values, stocks)
-        rows = self._observation[indices]
-        rows[:, :5] = (values[:, :5] + _SHIFT[:5]) / _SCALE[:5]
-        rows[:, 11 : _SITE.start] = (values[:, 11 : _SITE.start] + _SHIFT[11 : _SITE.start]) / _SCALE[11 : _SITE.start]
-        self._observation[indices] = rows
+        scaled = (values + _SHIFT) / _SCALE
+        scaled[:, _SITE] = [sim.scale_site(site) for site in sites]
+        self._observation[indices] = scaled
 
-    def _observe_year(self, record, actions, conifers_before, components) -> None:
+    def _observe_year(self, record, actions, components) -> None:
         """Observation after a year; what was last year's becomes the year before's."""
         column = {name: record[:, i] for name, i in _COLUMN.items()}
-        older = self._observation[:, [11, 13, 15]].copy()
         values = np.zeros((self.number, len(OBSERVATION)))
         values[:, 1] = self.year
-        values[:, 11], values[:, 13] = column["fire_mortality"], column["insect_mortality"]
-        values[:, 15] = column["drought_index"]
-        values[:, 17] = column["biomass_change_kgc_m2"]
-        values[:, 18] = column["soil_change_kgc_m2"]
-        values[:, 19] = column["net_carbon_change_kgc_m2"]
-        values[:, 20] = column["mortality_kgc_m2"]
-        values[:, 21] = column["litterfall_kgc_m2"]
-        values[:, 22] = column["harvest_kgc_m2"]
-        values[:, 23] = column["hwp_stored_kgc_m2"]
+        for i, name in _RECORDED.items():
+            values[:, i] = column[name]
         values[:, 24], values[:, 25] = actions // 5, actions % 5
         values[:, 26] = column["planted_stems_ha"] - column["thinned_stems_ha"]
-        values[:, 27] = column["conifer_fraction_after_action"] - conifers_before
-        values[:, 40] = components["biomass_limit_penalty"]
-        values[:, 41] = components["soil_limit_penalty"]
-        values[:, 42] = components["density_penalty"]
+        values[:, 27] = column["conifer_fraction_after_action"] - self._observation[:, 3]
+        values[:, _PENALTIES] = np.stack([components[name] for name in OBSERVATION_NAMES[_PENALTIES]], axis=1)
         self._fill_stand(values, self.stands.stocks(np.arange(self.number)))
         scaled = (values + _SHIFT) / _SCALE
         scaled[:, 5:11] = self._observation[:, 5:11]
         scaled[:, _SITE] = self._observation[:, _SITE]
-        scaled[:, [12, 14, 16]] = older
+        scaled[:, [12, 14, 16]] = self._observation[:, [11, 13, 15]]
         self._observation = scaled
 
     @staticmethod
@@ -598,12 +601,12 @@ class _Episodes:
                 setattr(self, name, value.copy())
 
 
-def check_preference(value) -> float:
+def check_preference(value, what: str = "preference") -> float:
     """A preference weight of the carbon objective, in [0, 1]."""
     number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
     if not number or not 0.0 <= value <= 1.0:
-        raise ValueError(f"preference: a number in [0, 1] is allowed, got {value!r}")
-    return float(value)
+        raise ValueError(f"{what}: a number in [0, 1] is allowed, got {value!r}")
+    return abs(float(value))  # 0.0 for -0.0
 
 
 def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict:
@@ -617,11 +620,15 @@ def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict
     return dict(options or {})
 
 
-def check_saved(state: dict, keys: Sequence[str]) -> None:
-    """A dict that `get_state` of the same kind of environment gave."""
-    if not isinstance(state, dict) or set(state) != set(keys):
-        got = sorted(state) if isinstance(state, dict) else type(state).__name__
-        raise ValueError(f"state: a dict of {', '.join(keys)} from get_state is allowed, got {got}")
+def check_saved(state: dict, kind: str) -> None:
+    """A dict that `get_state` of the same kind of environment, "single" or "vector", gave."""
+    keys = {"single": ["episodes", "generator"], "vector": ["episodes", "generators"]}
+    got = sorted(state, key=str) if isinstance(state, dict) else type(state).__name__
+    for other in keys:
+        if got == keys[other] != keys[kind]:
+            raise ValueError(f"state of a {other} environment given to a {kind} one")
+    if got != keys[kind]:
+        raise ValueError(f"state: a dict of {', '.join(keys[kind])} from get_state is allowed, got {got}")
 
 
 ARGUMENTS = tuple(name for name in inspect.signature(_Episodes).parameters if name != "number")
@@ -662,14 +669,16 @@ class BorealEnv(gym.Env, EzPickle):
 
     ## Observation Space
     `Box` of 105 values (generalist) or 43 (site-specific, without the 62 site parameters), float32;
-    `boreal_env.OBSERVATION` has the name, unit, normalisation and limits of each. The first is the preference for
-    carbon; pairs of years have the last year first; age fractions are of all stems.
+    `boreal_env.OBSERVATION` has the name, unit, normalisation and limits of each, `observation_names` the names of
+    those that this environment gives. The first is the preference for carbon; pairs of years have the last year first;
+    age fractions are of all stems.
 
     ## Action Space
     `Discrete(25)`: action = 5 x density index + mix index; density changes (-100, -50, 0, 50, 100) stems/ha, conifer
     mixes (0, 0.25, 0.5, 0.75, 1). Planting adds seedlings of that mix; thinning cuts the oldest class first, so that
     the remaining stand nears the mix. `action_masks()` says which actions can be carried out in full; the others are
-    legal, do what can be done, and cost a penalty.
+    legal, do what can be done, and cost a penalty. The density penalty is another: a stand at or above
+    `density_limit` after the action costs it whatever the action, valid or not.
 
     ## Reward Space
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, soil and wood products over `carbon_scale`,
@@ -691,20 +700,29 @@ class BorealEnv(gym.Env, EzPickle):
     - `thaw_formulation`: "asymmetric", "contrast" or "raw_degree_days"
     - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one
     - `site_seed`: one site (`sim.sample_site(site_seed)`) instead of a new one each episode
-    - `parameter_overrides`: site parameter -> value or (low, high)
-    - `initial_ranges`: first stock -> (low, high), see `sim.INITIAL_RANGES`
+    - `parameter_overrides`: site parameter -> value or (low, high), see `sim/site_parameters.csv`; nothing else of the
+      site changes, but with `latitude_deg` the mean annual temperature, which is drawn around its latitude's
+    - `initial_ranges`: first stock -> (low, high), see `sim.INITIAL_RANGES`; biomass is at most 120 kgC a stem
     - `hwp_half_life_years`: half-life of wood products (None: for ever)
     - `harvest_min_class`: youngest class that may be cut: "young", "mature" or "old"
-    - `reward`: a `Reward` or a dict of its constants
+    - `reward`: a `Reward`, or a dict of the constants to change
+    - `balanced`: whether `carbon_scale`, unless `reward` gives it, is 1.4 (`boreal-balanced-v0`) instead of 2
     - `objectives`: of the reward vector, "carbon", "thaw" and any `Objective` of your own
     - `mechanisms`: switches of the physics, see `sim.MECHANISMS`
     - `constants`: literature constants to override, see `sim/constants.csv`
-    - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`
+    - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`, whose order they keep
     - `record_years`: put the annual record into the last step's info, as `info["years"]`
     - `render_mode`: "rgb_array" or None
 
-    `reset(seed=, options={"preference": w, "site": {name: value}})`. Bad values raise ValueError. `info` is empty
-    but for the last step, where it has the episode's totals.
+    ## Reset and Step
+    `reset(seed=, options={"preference": w, "site": {name: value}})`; seeds are at most 2^63 - 1, here and everywhere.
+    `info` is empty but for the last step, where it has the episode's totals. Bad values raise ValueError, a step before
+    reset or after the end RuntimeError.
+
+    ## Saving
+    `get_state()` has everything that the future depends on, the running episode and the generators; `set_state` gives
+    it to another environment with the same arguments. `pickle` and `copy.deepcopy` keep the arguments alone: their copy
+    has to be reset, or given the state.
 
     ## Credits
     After BoreaRL (Dsouza et al. 2025, arXiv 2509.19846).
@@ -719,6 +737,7 @@ class BorealEnv(gym.Env, EzPickle):
         self.render_mode = render_mode
         self._episodes = _Episodes(1, **_known(kwargs))
         self.observation_space = self._episodes.observation_space
+        self.observation_names = self._episodes.observation_names
         self.action_space = Discrete(NUM_ACTIONS)
         self.reward_space = self._episodes.reward_space
         self.reward_dim = len(self._episodes.objective_names)
@@ -762,7 +781,7 @@ class BorealEnv(gym.Env, EzPickle):
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
-        check_saved(state, ("episodes", "generator"))
+        check_saved(state, "single")
         self._episodes.set_state(state["episodes"])
         self.np_random.bit_generator.state = state["generator"]
 
@@ -777,9 +796,12 @@ class BorealVectorEnv(VectorEnv, EzPickle):
 
     With the same seeds and actions it gives the trajectories of `num_envs` single environments. Episodes that end
     start anew within the step (`AutoresetMode.SAME_STEP`); infos then have `final_obs` and `final_info`.
-    `group_size` neighbours share site, start, weather and disturbance dice in every episode, not the preference.
     `reset(options={"preference": one or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`, where
     only stands of the mask start anew.
+
+    `group_size` neighbours share site, start, weather and disturbance dice in every episode, not the preference: all
+    but that are drawn from the seed of a group's first stand. The options "site" and "reset_mask" have to be the same
+    within a group.
     """
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
@@ -788,15 +810,15 @@ class BorealVectorEnv(VectorEnv, EzPickle):
         EzPickle.__init__(self, num_envs, group_size=group_size, render_mode=render_mode, **kwargs)
         if render_mode is not None:
             raise ValueError(f"render_mode {render_mode!r}: the vector environment draws nothing; None is allowed")
-        if isinstance(num_envs, bool) or not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
-            raise ValueError(f"num_envs: a positive integer is allowed, got {num_envs!r}")
-        if isinstance(group_size, bool) or not isinstance(group_size, (int, np.integer)) or group_size < 1:
-            raise ValueError(f"group_size: a positive integer is allowed, got {group_size!r}")
+        for name, value in (("num_envs", num_envs), ("group_size", group_size)):
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+                raise ValueError(f"{name}: a positive integer is allowed, got {value!r}")
         if num_envs % group_size:
             raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
         self.num_envs, self.group_size = int(num_envs), int(group_size)
         self._episodes = _Episodes(self.num_envs, **_known(kwargs))
         self.single_observation_space = self._episodes.observation_space
+        self.observation_names = self._episodes.observation_names
         self.single_action_space = Discrete(NUM_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -806,6 +828,7 @@ class BorealVectorEnv(VectorEnv, EzPickle):
 
     def reset(self, *, seed=None, options: dict | None = None):
         """Start episodes. seed : an integer (environment i gets seed + i), or one integer or None for each."""
+        self._check_open()
         options = check_reset_options(options, ("reset_mask",))
         mask = np.ones(self.num_envs, bool) if options.get("reset_mask") is None else options["reset_mask"]
         mask = np.asarray(mask)
@@ -814,10 +837,13 @@ class BorealVectorEnv(VectorEnv, EzPickle):
         preferences = _spread("preference", options.get("preference"), self.num_envs)
         preferences = [None if value is None else check_preference(value) for value in preferences]
         sites = _spread("site", options.get("site"), self.num_envs)
-        for site in sites:
-            sim.middle_site(site)
-        one = isinstance(seed, (int, np.integer)) and not isinstance(seed, bool)
-        seeds = _spread("seed", [seed + i for i in range(self.num_envs)] if one else seed, self.num_envs)
+        self._check_groups("site", [check_overrides(site) for site in sites])
+        self._check_groups("reset_mask", mask.tolist())
+        if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool):
+            if check_seed("seed", seed) > 2**63 - self.num_envs:
+                raise ValueError(f"seed = {seed}: stand i gets seed + i, so at most 2^63 - {self.num_envs} is allowed")
+            seed = [int(seed) + i for i in range(self.num_envs)]
+        seeds = _spread("seed", seed, self.num_envs)
         if self._generators is None:
             self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
         for i, value in enumerate(seeds):
@@ -828,6 +854,7 @@ class BorealVectorEnv(VectorEnv, EzPickle):
 
     def step(self, actions):
         """A year of every stand under `actions`, integers (num_envs,)."""
+        self._check_open()
         rewards = self._episodes.advance(actions)
         ended = ~self._episodes.running
         infos: dict = {}
@@ -858,11 +885,23 @@ class BorealVectorEnv(VectorEnv, EzPickle):
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
-        check_saved(state, ("episodes", "generators"))
+        check_saved(state, "vector")
         self._episodes.set_state(state["episodes"])
         self._generators = state["generators"] and [np.random.default_rng(0) for _ in range(self.num_envs)]
         for generator, value in zip(self._generators or [], state["generators"] or [], strict=True):
             generator.bit_generator.state = value
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise gym.error.ClosedEnvironmentError("the vector environment is closed: make another")
+
+    def _check_groups(self, what: str, values: list) -> None:
+        """Refuse reset options that differ between the members of a group."""
+        for first in range(0, self.num_envs, self.group_size):
+            group = values[first : first + self.group_size]
+            if any(value != group[0] for value in group):
+                last = first + self.group_size - 1
+                raise ValueError(f"{what}: the same for stands {first} to {last}, a group, is allowed, got {group}")
 
     def _begin(self, indices, preferences, sites) -> None:
         draws = [self._episodes.draw(self._generators[i]) for i in indices]
@@ -886,15 +925,10 @@ def _spread(name, value, number) -> list:
 # ---------------------------------------------------------------------------------------------------------------
 # Registration
 # ---------------------------------------------------------------------------------------------------------------
-
-#: Carbon scale [kgC m-2 yr-1] at which both returns vary equally between policies of one site, as measured by
-#: `analysis/measure_balance.py`.
-BALANCED_CARBON_SCALE = 1.4
-
 for _name, _kwargs in {
     "boreal-generalist-v0": {"mode": "generalist"},
     "boreal-site-specific-v0": {"mode": "site_specific"},
-    "boreal-balanced-v0": {"mode": "generalist", "reward": asdict(Reward(carbon_scale=BALANCED_CARBON_SCALE))},
+    "boreal-balanced-v0": {"mode": "generalist", "balanced": True},
 }.items():
     gym.register(
         id=_name,

@@ -13,6 +13,27 @@ import tyro
 import boreal_env
 from boreal_env import OBSERVATION, BorealEnv, BorealVectorEnv, Objective, Observed, Reward
 
+#: Key of the last step's info -> (unit, meaning).
+FINAL_INFO = {
+    "carbon_return": ("1", "sum of the carbon rewards"),
+    "thaw_return": ("1", "sum of the thaw rewards; `<name>_return` of each objective of your own"),
+    "site_seed": ("", "the site is `sim.sample_site(site_seed)` before `parameter_overrides` and the option `site`; "
+                      "in site-specific mode without temperature noise, and -1, the middle of every range, if no "
+                      "`site_seed` is given"),
+    "episode_seed": ("", "of the start, the weather and the dice, as in `sim.simulate(seed=)`; in site-specific mode "
+                         "the `site_seed`, 0 without one"),
+    "preference": ("1", "weight of carbon that was observed"),
+    "final_density": ("stems ha-1", "at the end of the last year"),
+    "mean_density": ("stems ha-1", "mean of the years' ends"),
+    "final_conifer_fraction": ("1", "conifers among the stems at the end of the last year"),
+    "mean_conifer_fraction": ("1", "mean of the years' ends"),
+    "growing_season_days": ("day yr-1", "days with a mean above 5 degC, mean of the years"),
+    "latent_heat_mj_m2": ("MJ m-2 yr-1", "latent heat to the air, mean of the years"),
+    "ground_shortwave_mj_m2": ("MJ m-2 yr-1", "shortwave absorbed by ground and snow, mean of the years"),
+    "years": ("", "with `record_years`: dict of `year` (from 1) and the columns `boreal_env.HISTORY_NAMES`, each with "
+                  "one value a year; units in `sim.state.RECORD`"),
+}  # fmt: skip
+
 
 def page() -> str:
     """The whole page, Markdown."""
@@ -31,12 +52,22 @@ mo-gymnasium's and other libraries is in [clients.md](clients.md); where the pap
 ## Observation, entry by entry
 `boreal_env.OBSERVATION`, in the paper's order. The agent sees the normalised value; limits are those of the value *x*
 in its unit, from physics. Names that end in `2yr` are of the year before last. The `site_` entries are the 62
-parameters of `sim/site_parameters.csv`, scaled by the ranges that they are sampled from.
+parameters of `sim/site_parameters.csv`, scaled by the ranges that they are sampled from. Of the last year,
+- `total_change` is that of biomass, soil and wood products, `products_stored` what went into products,
+- `thinning_loss` is the carbon of all that was cut, the part that became products included,
+- `density_change` is what was carried out of the action, `mix_change` how much the action changed the conifer fraction
+  of the stand (without a density change 0 but for round-off).
+
+Before the first year both indices are those of an action that changes nothing: the middle density, the nearest mix.
+
+`boreal_env.action_masks(observations)` reads whole observations, 43 or 105 columns; with `observation_groups`, ask the
+environment: `env.action_masks()`.
 
 {table(("index", "name", "unit", "normalised", "limits", "group"), map(observation_row, enumerate(OBSERVATION)))}
 
 ## Reward, constant by constant
-`boreal_env.Reward`; the paper's values. `boreal-balanced-v0` has `carbon_scale = {boreal_env.BALANCED_CARBON_SCALE:g}`.
+`boreal_env.Reward`; the paper's values. `boreal-balanced-v0` has `carbon_scale = {boreal_env.BALANCED_CARBON_SCALE:g}`
+and keeps it when `reward` is a dict of other constants.
 
 {table(("constant", "value"), ((f"`{name}`", f"{value:g}") for name, value in asdict(Reward()).items()))}
 
@@ -45,6 +76,11 @@ What the environment adds to the annual record:
 
 Change and bonuses less penalties are `carbon_reward + carbon_clipped`; with `components_clipped`, what they would be if
 nothing were clipped.
+
+## The last step's info
+Of a vector environment each is an array in `infos["final_info"]`.
+
+{table(("key", "unit", "meaning"), ((f"`{name}`", *row) for name, row in FINAL_INFO.items()))}
 
 ## Objectives of your own
 `boreal_env.Objective(name, value, low, high)`. {inspect.getdoc(Objective)}

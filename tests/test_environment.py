@@ -101,6 +101,21 @@ def test_the_balanced_id_changes_one_constant_only():
     assert balanced.reward == Reward(carbon_scale=boreal_env.BALANCED_CARBON_SCALE) != paper.reward
 
 
+def test_the_balanced_id_keeps_its_constant_beside_others():
+    def rewards(**kwargs):
+        env = gym.make("boreal-balanced-v0", **kwargs)
+        spec = gym.envs.registration.EnvSpec.from_json(env.spec.to_json())
+        envs = gym.make_vec("boreal-balanced-v0", num_envs=2, **kwargs)
+        made = env.unwrapped, gym.make(spec).unwrapped, envs.unwrapped
+        copies = [pickle.loads(pickle.dumps(one)) for one in (made[0], made[2])]
+        return {one._episodes.reward for one in (*made, *copies)}
+
+    balanced = boreal_env.BALANCED_CARBON_SCALE
+    assert rewards(reward={"warming_weight": 3.0}) == {Reward(carbon_scale=balanced, warming_weight=3.0)}
+    assert rewards(reward={"carbon_scale": 0.4}) == {Reward(carbon_scale=0.4)}
+    assert BorealEnv(balanced=True, reward=Reward(thaw_scale=3.0))._episodes.reward == Reward(thaw_scale=3.0)
+
+
 @pytest.mark.parametrize("mode", boreal_env.MODES)
 def test_gymnasiums_checker_is_satisfied(mode):
     env = TransformReward(quick(mode=mode), lambda reward: float(reward.sum()))
@@ -248,6 +263,13 @@ def test_info_is_empty_until_the_end():
         "ground_shortwave_mj_m2",
     }  # fmt: skip
     assert all(isinstance(value, (int, float)) for value in infos[3].values())
+    assert infos[3].keys() | {"years"} == document_environment.FINAL_INFO.keys()
+
+
+def test_seeds_of_the_fixed_world_are_what_the_page_says():
+    default, other = (play(quick(mode="site_specific", **k), ACTIONS, seed=1)[2] for k in ({}, {"site_seed": 5}))
+    assert (default["site_seed"], default["episode_seed"]) == (-1, 0)
+    assert (other["site_seed"], other["episode_seed"]) == (5, 5)
 
 
 # ---------------------------------------------------------------------------------------------- the observation
@@ -401,6 +423,19 @@ def test_observation_groups(groups):
     kept = [i for i, entry in enumerate(OBSERVATION) if entry.group in groups]
     np.testing.assert_array_equal(part, whole[kept])
     assert part in env.observation_space
+    assert env.observation_names == quick_vector(2, observation_groups=groups).observation_names
+    assert env.observation_names == tuple(OBSERVATION_NAMES[i] for i in kept)
+
+
+def test_observation_names_of_the_modes():
+    assert quick().observation_names == OBSERVATION_NAMES
+    assert quick_vector(2, mode="site_specific").observation_names == OBSERVATION_NAMES[:43]
+
+
+def test_the_environments_mask_needs_no_whole_observation():
+    env, whole = quick(observation_groups=("carbon",)), quick()
+    env.reset(seed=3), whole.reset(seed=3)
+    np.testing.assert_array_equal(env.action_masks(), whole.action_masks())
 
 
 # ------------------------------------------------------------------------------------------ seeds and determinism
@@ -437,6 +472,7 @@ def test_preference_is_the_option_the_constructors_or_drawn():
     env = quick(fixed_preference=0.75)
     assert env.reset(seed=1)[0][0] == np.float32(0.75)
     assert env.reset(seed=1, options={"preference": 0.25})[0][0] == np.float32(0.25)
+    assert not np.signbit(env.reset(seed=1, options={"preference": -0.0})[0][0])
     drawn = quick_vector(64, years=1).reset(seed=0)[0][:, 0]
     assert len(set(drawn)) == 64
     assert drawn.min() < 0.1 and drawn.max() > 0.9 and 0.35 < drawn.mean() < 0.65
@@ -667,6 +703,37 @@ def test_a_group_shares_site_and_weather_in_every_episode_not_the_preference():
         assert not np.array_equal(years["density_stems_ha"][3], years["density_stems_ha"][5])
 
 
+def test_of_the_seeds_in_a_group_the_first_is_the_worlds():
+    envs = quick_vector(4, group_size=2)
+    one, other = (envs.reset(seed=seeds)[0] for seeds in ([1, 2, 3, 4], [1, 98, 3, 99]))
+    np.testing.assert_array_equal(one[:, 1:], other[:, 1:])
+    assert (one[:, 0] == other[:, 0]).tolist() == [True, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"reset_mask": np.array([True, True, True, False])}, r"reset_mask: .* stands 2 to 3, a group, .*True, False"),
+        ({"site": [{"q10": 2.0}, {"q10": 2.1}, None, None]}, r"site: .* stands 0 to 1, a group, is allowed, .*2.1"),
+        ({"site": [None, None, {}, {"q10": 2.1}]}, r"site: .* stands 2 to 3"),
+    ],
+)
+def test_a_group_that_would_not_share_is_refused(options, message):
+    envs = quick_vector(4, group_size=2)
+    envs.reset(seed=1)
+    with pytest.raises(ValueError, match=message):
+        envs.reset(options=options)
+
+
+def test_a_group_may_have_a_site_and_be_reset_as_one():
+    envs = quick_vector(4, group_size=2)
+    envs.reset(seed=1)
+    sites = [{}, None, {"q10": (1.9, 2.2)}, {"q10": [1.9, 2.2]}]
+    mask = np.array([False, False, True, True])
+    observations, _ = envs.reset(seed=7, options={"reset_mask": mask, "site": sites})
+    np.testing.assert_array_equal(observations[2, 1:], observations[3, 1:])
+
+
 # ---------------------------------------------------------------------------------------------------- resuming
 
 
@@ -777,6 +844,28 @@ def test_the_penalty_is_half_the_share_that_could_not_be_made():
     assert info["years"]["density_penalty"][0] == 1.0  # 2000 stems after planting
 
 
+def test_planting_up_to_the_limit_costs_the_density_penalty_whatever_the_mix():
+    """Stems of two species and many ages add up to 2000 but for round-off, on either side."""
+    starts, mixes = np.repeat(np.arange(16), 5), np.tile(np.arange(5), 16)
+    ranges = {"density_stems_ha": (1901.0, 2000.0)}
+    envs = quick_vector(80, years=1, time_step_minutes=1440, record_years=True, initial_ranges=ranges)
+    envs.reset(seed=starts.tolist())
+    years = envs.step(20 + mixes)[4]["final_info"]["years"]
+    density = np.concatenate(years["density_after_action"])
+    np.testing.assert_allclose(density, 2000.0, rtol=1e-12)
+    assert (density < 2000.0).any()
+    assert (np.concatenate(years["density_penalty"]) == 1.0).all()
+
+
+def test_planting_that_ends_just_below_the_limit_costs_nothing():
+    env = quick(years=1, record_years=True, initial_ranges={"density_stems_ha": (1899.99, 1899.99)})
+    env.reset(seed=1)
+    assert env.action_masks()[24]
+    years = env.step(24)[4]["years"]
+    assert years["density_after_action"][0] == pytest.approx(1999.99, abs=1e-9)
+    assert years["density_penalty"][0] == years["ineffective_penalty"][0] == 0.0
+
+
 def test_masks_of_nan_are_refused():
     observations = np.zeros((2, 43))
     observations[1, INDEX["density"]] = NAN
@@ -784,10 +873,11 @@ def test_masks_of_nan_are_refused():
         boreal_env.action_masks(observations)
 
 
-@pytest.mark.parametrize("observations", [np.zeros((2, 10)), np.zeros((2, 2, 105)), np.zeros(0)], ids=str)
-def test_masks_of_arrays_that_are_no_observations_are_refused(observations):
-    with pytest.raises(ValueError, match=r"observations.*\(n, "):
-        boreal_env.action_masks(observations)
+@pytest.mark.parametrize("shape", [(2, 10), (2, 42), (2, 44), (2, 104), (2, 106), (2, 2, 105), (0,)], ids=str)
+def test_masks_of_arrays_that_are_no_whole_observations_are_refused(shape):
+    message = r"observations of shape .*: \(n, 43\) or \(n, 105\), all groups .*; env.action_masks\(\) works"
+    with pytest.raises(ValueError, match=message):
+        boreal_env.action_masks(np.zeros(shape))
 
 
 # ------------------------------------------------------------------------------------------------------- reward
@@ -996,6 +1086,24 @@ def test_a_third_objective_in_vector_environments():
     np.testing.assert_array_equal(resumed.step(actions[0])[1], lockstep.step(actions[0])[1])
 
 
+def rewrites_the_record(year):
+    year["carbon_reward"][:] = 1.0
+    return year["carbon_reward"]
+
+
+def adds_to_its_own_dict(year):
+    year["carbon_reward"] = np.ones_like(year["carbon_reward"])
+    return year["carbon_reward"]
+
+
+def test_an_objective_cannot_rewrite_the_record():
+    with pytest.raises(ValueError, match="read-only"):
+        play(quick(objectives=("carbon", Objective("bad", rewrites_the_record))), ACTIONS, seed=1)
+    _, rewards, info = play(quick(objectives=("carbon", Objective("own", adds_to_its_own_dict))), ACTIONS, seed=1)
+    np.testing.assert_array_equal(rewards[:, 0], play(quick(), ACTIONS, seed=1)[1][:, 0])
+    assert info["own_return"] == 4.0
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -1032,7 +1140,7 @@ BAD_ARGUMENTS = {
     "time step of float": ({"time_step_minutes": 30.0}, r"time_step_minutes: .* got 30.0"),
     "backend": ({"backend": "torch"}, r"backend 'torch': allowed are numba, python"),
     "thaw formulation": ({"thaw_formulation": "thaw"}, r"thaw_formulation 'thaw': allowed are asymmetric, contrast"),
-    "preference above 1": ({"fixed_preference": 1.1}, r"preference: a number in \[0, 1\] is allowed, got 1.1"),
+    "preference above 1": ({"fixed_preference": 1.1}, r"^fixed_preference: a number in \[0, 1\] is allowed, got 1.1"),
     "preference nan": ({"fixed_preference": NAN}, r"preference: .* got nan"),
     "preference of text": ({"fixed_preference": "carbon"}, r"preference: .* got 'carbon'"),
     "site seed -1": ({"site_seed": -1}, r"site_seed: .* got -1"),
@@ -1073,6 +1181,8 @@ BAD_ARGUMENTS = {
     "groups as number": ({"observation_groups": 5}, r"observation_groups.*5"),
     "no groups": ({"observation_groups": ()}, r"observation_groups"),
     "no group left": ({"observation_groups": ("site",), "mode": "site_specific"}, r"observation_groups.*site"),
+    "group twice": ({"observation_groups": ("age", "state", "age")}, r"observation_groups age, state, age: each"),
+    "balanced of number": ({"balanced": 1.4}, r"balanced: True or False is allowed, got 1.4"),
     "record of number": ({"record_years": 1}, r"record_years: True or False is allowed, got 1"),
     "render mode": ({"render_mode": "human"}, r"render_mode 'human': allowed are rgb_array"),
 }  # fmt: skip
@@ -1155,9 +1265,19 @@ def test_what_is_no_state_is_refused(state, got):
 def test_the_state_of_a_vector_environment_is_not_that_of_one():
     one, envs = quick(), quick_vector(1)
     one.reset(seed=1), envs.reset(seed=1)
-    for env, state in ((one, envs.get_state()), (envs, one.get_state())):
-        with pytest.raises(ValueError, match="state: a dict of episodes"):
-            env.set_state(state)
+    with pytest.raises(ValueError, match="state of a vector environment given to a single one"):
+        one.set_state(envs.get_state())
+    with pytest.raises(ValueError, match="state of a single environment given to a vector one"):
+        envs.set_state(one.get_state())
+
+
+def test_a_closed_vector_environment_is_refused():
+    envs = quick_vector(2)
+    envs.reset(seed=1)
+    envs.close()
+    for call in (lambda: envs.step([12, 12]), lambda: envs.reset(seed=1)):
+        with pytest.raises(gym.error.ClosedEnvironmentError, match="closed"):
+            call()
 
 
 def test_step_after_the_end_is_refused():
@@ -1215,6 +1335,7 @@ def test_vector_constructor_refuses(arguments, message):
 @pytest.mark.parametrize(
     ("reset", "message"),
     [
+        ({"seed": 2**63 - 1}, r"seed = 9223372036854775807: stand i gets seed \+ i, so at most 2\^63 - 3 is allowed"),
         ({"seed": [1, 2]}, r"seed: one value or 3 are allowed, got 2"),
         ({"options": {"preference": [0.1, 0.2]}}, r"preference: one value or 3 are allowed, got 2"),
         ({"options": {"preference": [0.1, 0.2, 3.0]}}, r"preference: .* got 3.0"),
