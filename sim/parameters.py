@@ -134,7 +134,7 @@ def check_overrides(overrides: dict | None) -> dict[str, tuple[float, float]]:
     checked = {}
     for name, value in check_mapping("site parameters", overrides).items():
         parameter = _lookup(SITE_PARAMETERS, "site parameter", name)
-        ends = value if isinstance(value, (tuple, list)) else (value, value)
+        ends = value if isinstance(value, (tuple, list)) or np.ndim(value) == 1 else (value, value)
         if len(ends) != 2:
             raise ValueError(f"{name}: a value or a (low, high) pair is allowed, got {value!r}")
         low, high = (_check_number(name, end, parameter) for end in ends)
@@ -179,17 +179,18 @@ def _lookup(table: dict, kind: str, name):
     if name in table:
         return table[name]
     near = difflib.get_close_matches(str(name), table, n=3)
-    hint = f"did you mean {', '.join(near)}?" if near else f"allowed: {', '.join(table)}"
-    raise ValueError(f"unknown {kind} {name!r}; {hint}")
+    hint = f"did you mean {', '.join(near)}? " if near else ""
+    raise ValueError(f"unknown {kind} {name!r}; {hint}allowed: {', '.join(table)}")
 
 
 def _check_number(name: str, value, parameter: Parameter) -> float:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not math.isfinite(value):
         raise ValueError(f"{name}: a finite number is allowed, got {value!r}")
     if not parameter.physical_low <= value <= parameter.physical_high:
+        unit = "" if parameter.unit == "1" else f" {parameter.unit}"
         raise ValueError(
             f"{name} = {value:g} is outside its physical limits "
-            f"[{parameter.physical_low:g}, {parameter.physical_high:g}] {parameter.unit}"
+            f"[{parameter.physical_low:g}, {parameter.physical_high:g}]{unit}"
         )
     return float(value)
 
