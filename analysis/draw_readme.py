@@ -59,7 +59,9 @@ def trained_policy(run_dir: Path) -> tuple[Policy, str]:
         protocol.fail(f"--run-dir {run_dir}: it has no checkpoint.pt")
     config = json.loads((run_dir / "config.json").read_text(encoding="utf-8"))
     env_id = config["arguments"]["env_id"]
-    agent = importlib.import_module(f"cleanrl_style.{config['script']}").Agent(gym.make_vec(env_id, num_envs=1))
+    critic = {"num_values": 2} if config["arguments"].get("per_objective_advantages") else {}
+    agent_class = importlib.import_module(f"cleanrl_style.{config['script']}").Agent
+    agent = agent_class(gym.make_vec(env_id, num_envs=1), **critic)
     agent.load_state_dict(torch.load(run_dir / "checkpoint.pt", weights_only=False)["agent"])
     torch.manual_seed(SEED)
 
