@@ -37,7 +37,7 @@ def study(env_id: str, episodes: int) -> pd.DataFrame:
     tables = []
     for action in PLANTING:
         def probabilities(observations, masks, accrued_returns, action=action):
-            return np.eye(sim.management.NUM_ACTIONS)[where_valid(observations, action)]
+            return np.eye(sim.management.NUM_ACTIONS)[where_valid(masks, action)]
 
         table, _ = protocol.evaluate(args, {}, probabilities, (0.0,), ("sampled",))
         tables.append(table.assign(env_id=env_id, action=action))
