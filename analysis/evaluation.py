@@ -100,6 +100,8 @@ def make_envs(env_id: str, env_kwargs: dict, num_envs: int) -> gym.vector.Vector
 
 def choose_actions(probabilities: np.ndarray, uniforms: np.ndarray | None) -> np.ndarray:
     """Actions (n,) for probabilities (n, 25): the most probable, or those drawn by a uniform number each."""
+    if not np.isfinite(probabilities).all():
+        raise FloatingPointError("the policy's action probabilities are not finite numbers: its training diverged")
     if uniforms is None:
         return probabilities.argmax(axis=1)
     cumulative = np.cumsum(probabilities, axis=1, dtype=np.float64)

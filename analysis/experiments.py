@@ -172,7 +172,7 @@ def controls(seeds) -> list[Job]:
 
 
 def variants(seeds) -> list[Job]:
-    """Gated PPO with one choice changed, and two of them together; EUPG with smaller batches, or rewards to come."""
+    """Gated PPO with one choice changed, and two of them together; EUPG with other batches, or rewards to come."""
     changes = (
         ("ppo_gated", {"reward_scales": REWARD_SCALES}),
         ("ppo_gated", {"per_objective_advantages": True}),
@@ -180,8 +180,9 @@ def variants(seeds) -> list[Job]:
         ("ppo_gated", {"ent_coef": 0.0, "per_objective_advantages": True}),
         ("ppo_gated", {"hide_site": True}),
         ("ppo_gated", {"learning_rate": 1e-3}),
-        ("eupg_var_lambda", {"num_envs": 8}),
+        ("eupg_var_lambda", {"num_envs": 32}),
         ("eupg_var_lambda", {"utility": "future"}),
+        ("eupg_var_lambda", {"num_envs": 1}),
     )
     return [trained("variants", script, seed, **change) for script, change in changes for seed in seeds_of(3, seeds)]
 

@@ -36,8 +36,8 @@ class Args:
     """observe no site parameters"""
     total_timesteps: int | None = None
     """steps, summed over all environments; episodes are played whole (None: 300000, in site-specific mode 100000)"""
-    num_envs: int | None = None
-    """number of environments, and of episodes in a batch; 1 is the paper's (None: 8 async, 32 lockstep)"""
+    num_envs: int = 8
+    """number of environments, and of episodes in a batch; 1 is the paper's"""
     vectorization: Literal["async", "lockstep"] = "async"
     """one process per environment, or all environments in one compiled call"""
     preference: float = 0.5
@@ -87,7 +87,7 @@ class Agent(nn.Module):
     def get_distribution(self, x, mask):
         """x (n, observation + 2), mask (n, 25) bool, at least one action valid in each row."""
         # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in the entropy
-        return Categorical(logits=torch.where(mask, self.actor(x), -1e8))
+        return Categorical(logits=torch.where(mask, self.actor(x), -1e8), validate_args=False)
 
     def get_action_and_value(self, x, mask, action=None):
         """EUPG has no value: the last of the four is None."""

@@ -133,7 +133,9 @@ class Agent(nn.Module):
         gate = torch.where(group_mask, self.gate(hidden), -1e8).log_softmax(dim=1)
         other = torch.where(other_mask, self.other_head(hidden), -1e8).log_softmax(dim=1)
         plant = torch.where(plant_mask, self.plant_head(hidden), -1e8).log_softmax(dim=1)
-        return Categorical(logits=torch.cat([gate[:, :1] + other, gate[:, 1:] + plant], dim=1))
+        logits = torch.cat([gate[:, :1] + other, gate[:, 1:] + plant], dim=1)
+        # its checks would take a quarter of an update; what is no number cannot be sampled from either
+        return Categorical(logits=logits, validate_args=False)
 
     def get_action_and_value(self, x, mask, action=None):
         distribution = self.get_distribution(x, mask)

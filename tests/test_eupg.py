@@ -130,3 +130,13 @@ def test_the_scripts_differ_in_the_preference_and_nothing_else():
     assert fixed.split("class Agent")[1] == variable.split("class Agent")[1]
     fields = [set(script.Args.__dataclass_fields__) for script in (eupg_fixed_lambda, eupg_var_lambda)]
     assert fields[0] ^ fields[1] == {"preference", "eval_weights"}
+
+
+def test_both_vectorizations_give_the_same_bytes(tmp_path):
+    """A batch is eight episodes in either, of the same seeds: only the speed differs."""
+    for vectorization in ("async", "lockstep"):
+        run_script("cleanrl_style/eupg_var_lambda.py", "--vectorization", vectorization, "--total-timesteps", 800,
+                   "--eval-episodes", 1, "--eval-weights", 0, 1, "--run-dir", tmp_path / vectorization)  # fmt: skip
+    for name in ("episodes", "updates", "evaluation"):
+        first, second = ((tmp_path / kind / f"{name}.csv").read_bytes() for kind in ("async", "lockstep"))
+        assert first == second and first.count(b"\n") > 2

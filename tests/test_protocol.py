@@ -105,6 +105,12 @@ def test_sampling_follows_the_probabilities():
     assert evaluation.choose_actions(probabilities[:1], None).tolist() == [3]
 
 
+@pytest.mark.parametrize("uniforms", [None, np.array([0.5])])
+def test_a_diverged_policy_is_refused(uniforms):
+    with pytest.raises(FloatingPointError, match="diverged"):
+        evaluation.choose_actions(np.full((1, 25), np.nan), uniforms)
+
+
 def test_statistics_of_the_annual_record():
     records = [{"year": np.array([1, 2]), "density": np.array([1.0, 2.0]) * k, "fraction": np.full(2, k)}
                for k in range(5)]
