@@ -10,7 +10,8 @@ ROOT = Path(__file__).parents[1]
 HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 METHODS = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum")  # conditioned on the preference
 TRAINED = (*METHODS, "eupg_fixed_lambda")
-STUDIES = ("constant_plans", "mechanism_pairs", "site_warming")
+STUDIES = ("constant_plans", "training_gains", "mechanism_pairs", "site_warming")
+READING = ("training_gains", "site_warming")  # studies that read the runs before them
 WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SITE_SEEDS = (1, 2, 3, 4, 5)
 GENERALIST_STEPS, SITE_SPECIFIC_STEPS = 300_000, 100_000
@@ -53,6 +54,11 @@ class Job:
     def is_study(self) -> bool:
         """Whether it is a study of `analysis`, which leaves a table, not a run."""
         return self.script in STUDIES
+
+    @property
+    def waits(self) -> bool:
+        """Whether the jobs before it have to be finished when it starts."""
+        return self.script in READING
 
     @property
     def trains(self) -> bool:
@@ -119,7 +125,8 @@ def seeds_of(number: int, chosen: list[int] | None) -> list[int]:
 def main_table(seeds) -> list[Job]:
     """Heuristics and constant plans, then the three methods, a seed of all before the next."""
     methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in METHODS]
-    return [Job("main", script) for script in (*HEURISTICS, "constant_plans")] + methods
+    fixed = [Job("main", script) for script in (*HEURISTICS, "constant_plans")]
+    return [*fixed, *methods, Job("main", "training_gains")]
 
 
 def fixed_weights(seeds) -> list[Job]:

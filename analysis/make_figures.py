@@ -19,6 +19,7 @@ from analysis.figures import (
     demographics,
     individual_objectives,
     learning_asymmetry,
+    learning_curves,
     performance_panel,
     site_influence,
     strategies,
@@ -29,7 +30,7 @@ from analysis.figures.common import STYLE, save
 from analysis.make_tables import name_of
 from analysis.results import Results
 
-FIGURES = (learning_asymmetry, algorithm_comparison, strategies, site_influence, trade_off_coverage,
+FIGURES = (learning_curves, learning_asymmetry, algorithm_comparison, strategies, site_influence, trade_off_coverage,
            training_dynamics, performance_panel, individual_objectives, demographics)  # fmt: skip
 
 

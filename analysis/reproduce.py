@@ -122,7 +122,7 @@ def run_jobs(jobs: list, log_dir: Path, cores: list[int], finished, poll=POLL_SE
     try:
         while waiting or running:
             free = [core for core in cores if core not in {one.core for one in running}]
-            while waiting and free:
+            while waiting and free and not (waiting[0].waits and running):
                 job = waiting.pop(0)
                 running.append(start(job, free.pop(0), log_dir / log_name(job)))
             time.sleep(poll)

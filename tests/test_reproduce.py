@@ -13,7 +13,7 @@ from analysis import experiments, protocol, reproduce, runs
 from analysis.experiments import Job
 from cleanrl_style.ppo_gated import Args
 
-COUNTS = {"main": 36, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 25, "variants": 24,
+COUNTS = {"main": 37, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 25, "variants": 27,
           "mechanisms": 2}
 
 
@@ -95,6 +95,10 @@ if what == "fails":
     sys.exit("error: this one fails")
 if what == "waits":
     time.sleep(60)
+if what == "is slow":
+    time.sleep(1)
+if what == "reads a":
+    assert (marks / "a done").exists()
 (marks / f"{name} done").touch()
 """
 
@@ -129,6 +133,13 @@ def test_a_failed_job_is_named_and_the_rest_goes_on(fake, capsys):
     assert "FAILED: python" in out and "--name b --what fails" in out and "error: this one fails" in out
     assert "3/4 jobs, 300 of 300 steps" in out
     assert all((fake[2] / f"{name} done").exists() for name in "acd")
+
+
+def test_a_study_that_reads_runs_starts_when_those_before_it_have_ended(fake, monkeypatch):
+    monkeypatch.setattr(experiments, "READING", ("reader",))
+    reader = Job("main", "reader", {"name": "b", "what": "reads a", "marks": fake[2]})
+    assert run([fake[0]("a", "is slow"), reader, fake[0]("c")], fake) == []
+    assert fake[1](reader)
 
 
 def test_finished_jobs_are_not_started_again(fake, capsys):

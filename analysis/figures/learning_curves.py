@@ -1,0 +1,82 @@
+"""Whether the methods learn: returns and gains in training, against fixed strategies and the best constant plan."""
+
+import numpy as np
+
+from analysis import constant_plans, metrics
+from analysis.experiments import HEURISTICS, METHODS
+from analysis.figures.common import COLOURS, SEEDS_95, STEPS, band, finish, learning_curve, methods, no_data, panels
+from analysis.results import TITLES
+from analysis.training_gains import gains
+
+SIZE = (7.2, 4.8)
+PARTS = 20  # of the training; fewer than of a learning curve, as a part of the episodes has a gain
+CAPTION = ("Sums over 50 years: (a-c) returns of training episodes, (d-f) less those of zero change on the same "
+           f"episodes; {SEEDS_95}. Dashed: fixed strategies in the evaluation, mean over weights; the best constant "
+           "plan is that of each weight.")  # fmt: skip
+QUANTITIES = {"carbon": "carbon", "thaw": "thaw", "scalarized": "scalarised"}
+
+
+def draw(figure, results) -> None:
+    """Carbon, thaw and their scalarisation: returns above, gains below."""
+    axes = panels(figure, 2, 3, [f"{title} {kind}" for kind in ("return", "gain") for title in QUANTITIES.values()])
+    nothing = results.study("training_gains")
+    levels = baselines(results)
+    for k, name in enumerate(QUANTITIES):
+        for script, title in methods(axes[k], results):
+            learning_curve(axes[k], results.of("main", script), f"{name}_return", COLOURS[script], title)
+        for script, _ in methods(axes[3 + k], results) if nothing is not None else ():
+            gain_curve(axes[3 + k], results.of("main", script), nothing, f"{name}_gain", COLOURS[script])
+        for ax, kind in ((axes[k], "return"), (axes[3 + k], "gain")):
+            if kind == "gain" and nothing is None:
+                no_data(ax, "python analysis/training_gains.py")
+                continue
+            for label, colour, values in levels:
+                if f"{name}_{kind}" in values:
+                    ax.axhline(values[f"{name}_{kind}"], color=colour, linestyle="--", linewidth=0.8, label=label)
+            finish(ax, legend=False, ylabel=f"{QUANTITIES[name]} {kind}", **STEPS)
+    handles, labels = axes[0].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside upper center", ncols=4, fontsize=6)
+
+
+def gain_curve(ax, replicates, nothing, column: str, colour) -> None:
+    """A gain of the training episodes against environment steps."""
+    found = [(one.runs[0], gains(one.runs[0], nothing)) for one in replicates]
+    found = [(run, table) for run, table in found if table is not None]
+    if not found:
+        return
+    steps = max(run.arguments["total_timesteps"] for run, _ in found)
+    curves = []
+    for _, table in found:
+        part = np.minimum((table.global_step - 1) * PARTS // steps, PARTS - 1)
+        curves.append(table[column].groupby(part).mean().reindex(range(PARTS)).to_numpy())
+    curves = np.array(curves)
+    known = ~np.isnan(curves).any(axis=0)
+    x = (np.arange(PARTS) + 0.5) * steps / PARTS / 1000
+    band(ax, x[known], curves[:, known], colour, None)
+
+
+def baselines(results) -> list[tuple]:
+    """(title, colour, quantity -> level) of the fixed strategies and of the best constant plan."""
+    levels = []
+    evaluated = [(TITLES[script], COLOURS[script], one.evaluation) for script in HEURISTICS
+                 for one in results.of("main", script)]  # fmt: skip
+    plans = results.study("constant_plans")
+    if plans is not None and evaluated:
+        env_id = results.first_job("main", METHODS[0]).env_id
+        weights = sorted(evaluated[0][2].preference.unique())
+        best = constant_plans.as_evaluation(plans[plans.env_id == env_id], weights, best=True)
+        evaluated.append(("Best constant plan", "#444444", best))
+    zero = next((evaluation for title, _, evaluation in evaluated if title == TITLES["zero_change"]), None)
+    for title, colour, evaluation in evaluated:
+        values = level(evaluation, "return")
+        if zero is not None:
+            values |= level(metrics.gains(evaluation, zero), "gain")
+        levels.append((title, colour, values))
+    return levels
+
+
+def level(evaluation, kind: str) -> dict[str, float]:
+    """Means over weights and episodes of carbon, thaw and their scalarisation."""
+    carbon, thaw = evaluation.carbon_return.mean(), evaluation.thaw_return.mean()
+    return {f"carbon_{kind}": carbon, f"thaw_{kind}": thaw, f"scalarized_{kind}": metrics.mean_scalarized(evaluation)}
