@@ -1,6 +1,6 @@
 """Speed: every figure the median of repeats that take turns, so that what else the machine does hits all alike.
 
-    python analysis/benchmark.py [--quick] [--only episode threads ...] [--run-dir runs/ppo_curriculum/.../seed1]
+    python analysis/benchmark.py [--quick] [--only episode threads ...]
 
 Prints the machine and a table, and writes results/benchmark.csv and .md. A row's ratio is to the first row of its
 section and unit, taken repeat by repeat: ratios carry from machine to machine, times do not. `analysis/
@@ -36,11 +36,14 @@ from sim.state import DAYS
 
 COLUMNS = ("section", "what", "unit", "median", "low", "high", "ratio", "repeats", "paper")
 
+ROOT = Path(__file__).parents[1]
+ROLLOUT = 2048  # steps of a training between two updates
+
 #: Our figure -> the paper's, a row of its table of running times.
 PAPER = {
     "50-year episode, 1 stand": "episode_50_years_numba",
     "async worker": "memory_per_env",
-    "training, total": "training_generalist_300k_steps",
+    "async, 300,000 steps with evaluation": "training_generalist_300k_steps",
 }
 
 #: A measurement gives its figures, (what, unit) -> value, anew each time it is called.
@@ -57,8 +60,6 @@ class Args:
     """smaller sizes and fewer repeats, without the compilation: half a minute"""
     repeats: int | None = None
     """repeats of every figure (7; 3 with --quick)"""
-    run_dir: Path | None = None
-    """a training run, whose timing.csv gives the section training"""
     output_dir: Path = Path("results")
     """folder for benchmark.csv and benchmark.md"""
 
@@ -244,15 +245,38 @@ def start_up(args: Args, stack: ExitStack) -> list[Measurement]:
 
 
 def training(args: Args, stack: ExitStack) -> list[Measurement]:
-    """Where the time of a training run went, from its timing.csv."""
-    if args.run_dir is None:
-        return []
-    timing = pd.read_csv(args.run_dir / "timing.csv")
-    phases = timing.groupby("phase").seconds.sum()
-    figures = {("training, total", "min"): timing.elapsed_seconds.max() / 60.0}
-    figures |= {(f"training, {phase}", "min"): phases[phase] / 60.0 for phase in phases.index}
-    figures["training, steps", "steps per s"] = timing.global_step.max() / timing.elapsed_seconds.max()
-    return [lambda: figures]
+    """Where the time of a step goes in a training of Curriculum PPO: short runs of the script, and the physics alone.
+
+    plumbing : the environment's time but for a year's physics of as many stands on the same cores, so that starts of
+    episodes are in it; policy : what a rollout takes beside the environment, mostly the forward pass. The whole run
+    is put together from these.
+    """
+    steps = 2 * ROLLOUT if args.quick else 3 * ROLLOUT
+    pool = stack.enter_context(ThreadPoolExecutor(available_cores()))
+
+    def measure(kind, number, groups):
+        with tempfile.TemporaryDirectory() as folder:
+            command = [sys.executable, ROOT / "cleanrl_style" / "ppo_curriculum.py", "--vectorization", kind,
+                       "--total-timesteps", steps, "--eval-episodes", 2 if args.quick else 32, "--eval-weights", 0, 1,
+                       "--run-dir", folder]  # fmt: skip
+            subprocess.run([str(word) for word in command], check=True, capture_output=True)
+            timing = pd.read_csv(Path(folder) / "timing.csv")
+            played = boreal_env.DEFAULT_YEARS * len(pd.read_csv(Path(folder) / "evaluation.csv"))
+        took = {phase: 1e3 * total for phase, total in timing.groupby("phase").seconds.sum().items()}
+        physics = 1e3 * statistics.median(physics_alone(groups, pool) for _ in range(5)) / number
+        environment, rollout, update = (took[phase] / steps for phase in ("environment", "rollout", "update"))
+        step = {"physics": physics, "plumbing": environment - physics, "policy": rollout - environment,
+                "update": update}  # fmt: skip
+        year = took["evaluation"] / played
+        whole = (300_000 * sum(step.values()) + 2 * 11 * 100 * boreal_env.DEFAULT_YEARS * year) / 60_000.0
+        return {
+            (f"{kind}, 300,000 steps with evaluation", "min"): whole,
+            **{(f"{kind}, {number} stands: {part}", "ms per step"): value for part, value in step.items()},
+            (f"{kind}: evaluation", "ms per year"): year,
+        }
+
+    kinds = {"async": (8, [started(1) for _ in range(8)]), "lockstep": (32, [started(32)])}
+    return [partial(measure, kind, *stands) for kind, stands in kinds.items()]
 
 
 SECTIONS = {
@@ -318,8 +342,6 @@ def main(args: Args) -> None:
         protocol.fail(f"--only {unknown[0]}: allowed are {', '.join(SECTIONS)}")
     if args.repeats is not None and args.repeats < 1:
         protocol.fail(f"--repeats {args.repeats}: at least 1 is needed")
-    if args.run_dir is not None and not (args.run_dir / "timing.csv").exists():
-        protocol.fail(f"--run-dir {args.run_dir}: it has no timing.csv")
     try:
         args.output_dir.mkdir(parents=True, exist_ok=True)
     except OSError as error:
