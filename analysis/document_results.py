@@ -1,0 +1,138 @@
+"""Writes the measured results into README.md and docs/algorithms/*.md, from the archived runs.
+
+    python analysis/document_results.py
+
+Each page has a pair of comments, `<!-- results of ppo_gated -->` and `<!-- end of results -->`; what is between them
+is made here, so that no page shows a number that the runs do not give.
+"""
+
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis import experiments, metrics, protocol, runs
+from analysis.results import METHODS, TITLES, Results
+from analysis.tables import main_results
+from analysis.tables.common import GENERALIST, over_seeds
+
+PAGES = ("README.md", *(f"docs/algorithms/{name}.md" for name in (*experiments.TRAINED, "heuristics")))
+SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
+PLANS = {"dense_conifer": "100 conifers a year", "best_constant_mix": "best constant plan of each weight"}
+ENDS = (0.0, 1.0)  # weights
+HEADING = (
+    "| {what} | seeds | carbon, weight 0 | weight 1 | thaw, weight 0 | weight 1 | scalarised | scalarised gain "
+    "| gain hypervolume | scalarised, the paper |\n|---|---|---|---|---|---|---|---|---|---|\n"
+)
+COLUMNS = ("carbon_0", "carbon_1", "thaw_0", "thaw_1", "scalarized", "gain_scalarized", "gain_hypervolume")
+
+
+@dataclass
+class Args:
+    """Writes the results of the archived runs into the documents."""
+
+    runs_dir: tuple[Path, ...] = (runs.ARCHIVE_DIR,)
+    """folders that hold the runs, at any depth: the archive, so that the documents show what a clone has"""
+    root: Path = Path()
+    """folder of README.md and docs/"""
+
+
+def numbers(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
+    """What a row shows of one run; a weight that it was not evaluated at is not a number."""
+    front = metrics.mean_returns(evaluation)
+    row = {f"{objective}_{weight:g}": front[f"{objective}_return"].get(weight, np.nan)
+           for objective in ("carbon", "thaw") for weight in ENDS}  # fmt: skip
+    row |= main_results.front_metrics(evaluation)
+    return row if gains is None else row | main_results.front_metrics(gains, "gain_")
+
+
+def line(title: str, evaluations: list, published: float = np.nan) -> str:
+    """A row of the table: interquartile means over seeds with 95 % intervals, and the paper's scalarised return."""
+    table = pd.DataFrame([numbers(*one) for one in evaluations], columns=COLUMNS)
+    values, cells = over_seeds(table), []
+    for name in COLUMNS:
+        value, low, high = (values[f"{name}{part}"] for part in ("", "_low", "_high"))
+        interval = "" if np.isnan(low) else f" [{low:.2f}, {high:.2f}]"
+        cells.append("" if np.isnan(value) else f"{value:.2f}{interval}")
+    cells.append("" if np.isnan(published) else f"{published:.2f}")
+    return f"| {title} | {len(table)} | " + " | ".join(cells) + " |\n"
+
+
+def flags(setting: str) -> str:
+    """A row's setting as flags of the command line; lockstep, which all runs of the experiments share, left out."""
+    words = []
+    for item in setting.split(", "):
+        name, _, value = item.partition("=")
+        if name not in ("default", "vectorization"):
+            words.append(f"--{name.replace('_', '-')}" + ("" if value == "True" else f" {value.replace(',', ' ')}"))
+    return f"`{' '.join(words)}`" if words else ""
+
+
+def rows_of(results: Results, script: str, environment: str | None = None) -> list[tuple[str, list, float]]:
+    """(flags, evaluations with gains, the paper's return) of a script's rows that have runs, the default first."""
+    published = main_results.paper_rows().paper_scalarized
+    found = [(key, [(one.evaluation, one.gains) for one in replicates]) for key, replicates in results.rows.items()
+             if key[0] == script and replicates and environment in (None, key[1])]  # fmt: skip
+    titled = []
+    for (_, env_id, setting), evaluations in found:
+        parts = [flags(setting), "" if env_id in (GENERALIST, environment) else f"`{env_id}`"]
+        title = ", ".join(filter(None, parts)) or "default"
+        papers = published.get(METHODS[script], np.nan) if title == "default" else np.nan
+        titled.append((title, evaluations, papers))
+    return sorted(titled, key=lambda row: row[0] != "default")
+
+
+def named(script: str, rows: list) -> list:
+    """The rows with the method's name before the flags."""
+    return [(TITLES[script] if title == "default" else f"{TITLES[script]}, {title}", *rest) for title, *rest in rows]
+
+
+def plans(results: Results) -> list[tuple[str, list]]:
+    """Rows of the constant plans of the generalist environment, if their study is there."""
+    found = main_results.constant_plans(results)
+    return [(title, found[name, GENERALIST, "default"]) for name, title in PLANS.items()
+            if found[name, GENERALIST, "default"]]  # fmt: skip
+
+
+def section(results: Results, name: str) -> str:
+    """What stands between the comments: of all methods, of the heuristics, or of one script."""
+    rows = []
+    if name == "all":
+        for script in (*experiments.METHODS, *experiments.HEURISTICS):
+            rows += named(script, rows_of(results, script, GENERALIST))
+        rows = [row for row in rows if "thaw-formulation" not in row[0] and "total-timesteps" not in row[0]]
+    elif name == "heuristics":
+        for script in experiments.HEURISTICS:
+            rows += named(script, rows_of(results, script))
+    else:
+        rows = rows_of(results, name)
+    if name in ("all", "heuristics"):
+        rows += plans(results)
+    if not rows:
+        return "No runs yet.\n"
+    what = "method" if name in ("all", "heuristics") else "flags"
+    return HEADING.format(what=what) + "".join(line(*row) for row in rows)
+
+
+def main(args: Args) -> None:
+    """Rewrite the sections of all pages."""
+    results = Results.load(False, args.runs_dir)
+    rows = results.rows  # completes left_out
+    for problem in results.left_out:
+        print(f"left out: {problem}", file=sys.stderr)
+    for page in PAGES:
+        path = args.root / page
+        text = path.read_text(encoding="utf-8")
+        new, count = SECTION.subn(lambda match: match[1] + section(results, match[2]) + match[3], text)
+        if not count:
+            protocol.fail(f"{path}: no section of results (<!-- results of ... --> to <!-- end of results -->)")
+        with protocol.replacing(path) as file:
+            file.write(new.encode())
+    print(f"wrote the results of {len(results.runs)} runs in {len(rows)} rows into {len(PAGES)} pages")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

@@ -1,0 +1,61 @@
+import shutil
+from pathlib import Path
+
+import pytest
+from tiny_runs import TINY_RUNS, write_run
+
+from analysis import document_results, experiments
+from analysis.results import Results
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def pages(tmp_path):
+    """A copy of the documents that have results."""
+    for page in document_results.PAGES:
+        (tmp_path / page).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / page, tmp_path / page)
+    return tmp_path
+
+
+def read(folder):
+    return {page: (folder / page).read_text(encoding="utf-8") for page in document_results.PAGES}
+
+
+def test_the_committed_documents_show_the_committed_runs(pages, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    document_results.main(document_results.Args(runs_dir=(Path("results/runs"),), root=pages))
+    assert read(pages) == read(ROOT)
+
+
+def test_rows_are_those_of_the_runs(tmp_path):
+    """Two seeds: carbon 0 and 1 at the ends of weight 0 to 1, then 1 and 2; zero change has nothing."""
+    write_run(tmp_path / "zero", "zero_change", carbon=(0, 0, 0), thaw=(0, 0, 0))
+    write_run(tmp_path / "a", "ppo_gated", seed=1, carbon=(0, 0, 1), thaw=(-1, -1, -1))
+    write_run(tmp_path / "b", "ppo_gated", seed=2, carbon=(1, 1, 2), thaw=(-3, -3, -3))
+    write_run(tmp_path / "c", "ppo_gated", carbon=(1, 1, 1), thaw=(0, 0, 0), ent_coef=0.0, hide_site=True)
+    results = Results((tmp_path,), experiments.jobs(), tmp_path / "none")
+    head, _, default, variant = document_results.section(results, "ppo_gated").splitlines()
+    cells = [cell.strip() for cell in default.split("|")[1:-1]]
+    assert len(cells) == len(head.split("|")) - 2
+    assert cells[:2] == ["default", "2"]
+    assert [cell.split(" ")[0] for cell in cells[2:6]] == ["0.50", "1.50", "-2.00", "-2.00"]
+    # weights 0, 0.5, 1: (-1, -0.5, 1) and (-3, -1, 2); zero change has nothing, so gains are the same
+    assert cells[6].split(" ")[0] == "-0.42" and cells[7] == cells[6]
+    assert cells[9] == "4.70"  # the paper's
+    assert variant.startswith("| `--ent-coef 0.0 --hide-site` | 1 | 1.00 | 1.00 | 0.00 |") and variant.endswith("|  |")
+
+
+def test_all_methods_and_the_heuristics(tmp_path):
+    results = Results((TINY_RUNS,), experiments.jobs(), tmp_path)
+    assert [row.split(" | ")[0] for row in document_results.section(results, "all").splitlines()[2:]] == [
+        "| Curriculum PPO", "| Zero change"]  # fmt: skip
+    assert len(document_results.section(results, "heuristics").splitlines()) == 3
+    assert document_results.section(results, "eupg_var_lambda") == "No runs yet.\n"
+
+
+def test_a_page_without_a_section_is_named(pages):
+    (pages / "README.md").write_text("nothing")
+    with pytest.raises(SystemExit, match="README.md: no section of results"):
+        document_results.main(document_results.Args(runs_dir=(TINY_RUNS,), root=pages))
