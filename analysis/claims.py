@@ -1,0 +1,180 @@
+"""Writes docs/reproduction.md: every claim of the paper that a number can test, with ours and a verdict.
+
+    python analysis/claims.py [--runs-dir runs results/runs] [--output docs/reproduction.md]
+
+Reads the runs and studies that exist, and the paper's tables (analysis/paper_tables). A claim without its runs says
+which command makes them. The claims are in analysis/paper_claims, a module a theme; numbers, intervals and verdicts are
+computed, and the same results give the same bytes.
+"""
+
+import sys
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis import protocol
+from analysis.experiments import EXPERIMENTS
+from analysis.paper_claims import (
+    asymmetry,
+    curriculum,
+    environment,
+    mechanisms,
+    paper_itself,
+    performance,
+    speed,
+    strategies,
+)
+from analysis.paper_claims.claim import (
+    CONTRADICTS,
+    FEWEST_SEEDS,
+    NO_RUNS,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    SEEDS,
+    UNDECIDED,
+    UNTESTABLE,
+    VERDICTS,
+    Claim,
+    Finding,
+    Missing,
+    Number,
+)
+from analysis.paper_claims.evidence import Evidence
+from analysis.results import Results
+
+THEMES = (environment, asymmetry, performance, curriculum, mechanisms, strategies, speed, paper_itself)
+MEANING = {
+    REPRODUCED: "our numbers meet the rule that the claim names",
+    NOT_REPRODUCED: "they meet its opposite",
+    CONTRADICTS: "another number of the paper, or its own definitions, exclude it",
+    UNTESTABLE: "what it needs is not logged, or not there",
+    UNDECIDED: f"the interval leaves both open, or there are fewer than {FEWEST_SEEDS} training seeds",
+    NO_RUNS: "what it needs has not been run",
+}
+
+INTRODUCTION = """\
+# The paper's claims
+
+Written by `python analysis/claims.py`; not to be edited. Every claim of the paper
+([Dsouza et al. 2025](https://arxiv.org/abs/2509.19846)) that a number can test, with its value, ours, and a verdict that
+is computed from the numbers by the rule that stands with it.
+
+Its simulator and ours are two programs with the same purpose. Values of returns, densities and fluxes need not agree;
+what a method can do, what comes out ahead, and which way a mechanism works should. Where ours differ, the claim says
+why, as far as an experiment tells.
+
+Ours are interquartile means over training seeds with 95 % bootstrap intervals, of sampled policies on the same 100 sites
+and weathers; differences between methods are paired by seed. Returns are sums over 50 years. What is "over sites" or
+"over episodes" is a mean with its 95 % t interval, and has no training in it. A value is the paper's if it is within a
+tenth of it.
+"""
+
+
+@dataclass
+class Args:
+    """Writes the paper's claims with our numbers and verdicts."""
+
+    runs_dir: tuple[Path, ...] | None = None
+    """folders that hold the runs, at any depth (None: results/runs and runs)"""
+    output: Path | None = None
+    """the document (None: docs/reproduction.md, or results/quick/reproduction.md)"""
+    quick: bool = False
+    """from the runs of `reproduce.py --quick`"""
+
+
+def judge(claim: Claim, evidence: Evidence) -> Finding:
+    """What the evidence says of a claim; a claim that lacks something has no rows."""
+    try:
+        return claim.measure(evidence)
+    except Missing as lacking:
+        return Finding([], NO_RUNS, str(lacking))
+
+
+def table(rows) -> list[str]:
+    """A claim's rows as Markdown."""
+    lines = ["| | paper | ours | over |", "|---|---|---|---|"]
+    for row in rows:
+        basis = row.ours.basis if isinstance(row.ours, Number) else ""
+        lines.append(f"| {row.what} | {row.paper} | {row.ours} | {basis} |")
+    return lines
+
+
+def explanation(claim: Claim, found: Finding) -> list[str]:
+    """The rule, the mechanism if the paper's is not met, and the note."""
+    lines = []
+    if found.rule and found.verdict != UNTESTABLE:
+        opposite = "; else the paper contradicts itself" if found.verdict == CONTRADICTS else ""
+        lines.append(f"Reproduced if {found.rule}{opposite}.")
+    counts = [row.ours.count for row in found.rows if isinstance(row.ours, Number) and row.ours.over == SEEDS]
+    if found.verdict == UNDECIDED and counts and min(counts) < FEWEST_SEEDS:
+        lines.append(f"Too few training seeds for a verdict: {FEWEST_SEEDS} are needed.")
+    if found.verdict in (NOT_REPRODUCED, CONTRADICTS) and claim.why:
+        lines.append(f"Why: {claim.why}")
+    elif found.verdict == NOT_REPRODUCED and claim.command:
+        lines.append("Why: no experiment has separated that yet.")
+    return lines + [claim.note] if claim.note else lines
+
+
+def section(number: int, claim: Claim, found: Finding) -> str:
+    """A claim as Markdown."""
+    head = [f'<a id="claim-{number}"></a>', f"### {number}. {claim.statement}", "", f"{claim.where}. **{found.verdict}**"]
+    if found.verdict == NO_RUNS:
+        body = [f"No runs yet: `{claim.command}`", f"(lacking: {found.rule})"]
+        return "\n".join([*head, "", *body, ""])
+    source = f"`{claim.command}`" if claim.command else "From the paper and this project's tables alone."
+    return "\n".join([*head, "", *table(found.rows), "", " ".join(explanation(claim, found)), "", source, ""])
+
+
+def contents(numbers: dict[str, list[int]]) -> str:
+    """Claims by verdict, as a table."""
+    lines = ["| verdict | claims | | that is |", "|---|---|---|---|"]
+    for verdict in VERDICTS:
+        links = " ".join(f"[{number}](#claim-{number})" for number in numbers[verdict])
+        lines.append(f"| {verdict} | {len(numbers[verdict])} | {links} | {MEANING[verdict]} |")
+    return "\n".join(lines)
+
+
+def progress(results: Results) -> str:
+    """How much of every experiment has been run, as a table."""
+    lines = ["| experiment | runs | planned | what |", "|---|---|---|---|"]
+    for name, what in EXPERIMENTS.items():
+        planned = [job for job in results.jobs if job.experiment == name and not job.is_study]
+        there = len(planned) - sum(job.experiment == name for job in results.missing)
+        if planned:
+            lines.append(f"| `{name}` | {there} | {len(planned)} | {what} |")
+    return "\n".join(lines)
+
+
+def document(results: Results) -> tuple[str, dict[str, list[int]]]:
+    """The document, and the numbers of the claims by verdict."""
+    evidence, sections, numbers, number = Evidence(results), [], defaultdict(list), 0
+    for theme in THEMES:
+        sections.append(f"## {theme.TITLE}\n")
+        for claim in theme.CLAIMS:
+            number += 1
+            found = judge(claim, evidence)
+            numbers[found.verdict].append(number)
+            sections.append(section(number, claim, found))
+    runs = "## What has been run\n\n`python analysis/reproduce.py` makes all, and goes on where it stopped.\n\n"
+    left_out = "".join(f"\nLeft out: {line}\n" for line in results.left_out)
+    parts = [INTRODUCTION, f"{number} claims:\n", contents(numbers) + "\n", *sections, runs + progress(results) + "\n"]
+    return "\n".join(parts) + left_out, numbers
+
+
+def main(args: Args) -> None:
+    """Write the document; print how many claims have which verdict."""
+    results = Results.load(args.quick, args.runs_dir)
+    text, numbers = document(results)
+    path = args.output or Path("results/quick/reproduction.md" if args.quick else "docs/reproduction.md")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with protocol.replacing(path) as file:
+            file.write(text.encode())
+    except OSError as error:
+        sys.exit(f"error: --output {path}: cannot write there ({error.strerror})")
+    counts = ", ".join(f"{len(numbers[verdict])} {verdict}" for verdict in VERDICTS if numbers[verdict])
+    print(f"{path}: {sum(map(len, numbers.values()))} claims of the paper; {counts}")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))
