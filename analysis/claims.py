@@ -8,7 +8,7 @@ computed, and the same results give the same bytes.
 """
 
 import sys
-from collections import defaultdict
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,18 +55,24 @@ MEANING = {
 INTRODUCTION = """\
 # The paper's claims
 
-Written by `python analysis/claims.py`; not to be edited. Every claim of the paper
-([Dsouza et al. 2025](https://arxiv.org/abs/2509.19846)) that a number can test, with its value, ours, and a verdict that
-is computed from the numbers by the rule that stands with it.
+Written by `python analysis/claims.py`; not to be edited. The claims of the paper
+([Dsouza et al. 2025](https://arxiv.org/abs/2509.19846)) that a number can test: the paper's value, ours, and a verdict
+that is computed from the numbers by the rule that stands with the claim.
 
 Its simulator and ours are two programs with the same purpose. Values of returns, densities and fluxes need not agree;
 what a method can do, what comes out ahead, and which way a mechanism works should. Where ours differ, the claim says
 why, as far as an experiment tells.
 
-Ours are interquartile means over training seeds with 95 % bootstrap intervals, of sampled policies on the same 100 sites
-and weathers; differences between methods are paired by seed. Returns are sums over 50 years. What is "over sites" or
-"over episodes" is a mean with its 95 % t interval, and has no training in it. A value is the paper's if it is within a
-tenth of it.
+**Numbers.** Ours are interquartile means over training seeds with 95 % bootstrap intervals, of sampled policies on the
+same evaluation sites and weathers; differences between methods are paired by seed. Returns are sums over 50 years;
+gains are returns less those of zero change on the same episodes. What is over sites or episodes is a mean with its 95 %
+t interval, and has no training in it.
+
+**Verdicts.** A claim that one thing is more than another is reproduced if the whole interval of the difference has its
+sign; it is not if the interval has the other sign, or includes zero but not the difference that the paper has. Only
+signs are judged: how large the paper's difference is stands beside ours. A value or a range is reproduced if ours lies
+in it, give or take a tenth, and not if all of our interval lies outside. A claim of several parts is not reproduced if
+one of them is not.
 """
 
 
@@ -100,11 +106,10 @@ def table(rows) -> list[str]:
 
 
 def explanation(claim: Claim, found: Finding) -> list[str]:
-    """The rule, the mechanism if the paper's is not met, and the note."""
+    """The rule, the mechanism if the claim is not reproduced, and the note."""
     lines = []
     if found.rule and found.verdict != UNTESTABLE:
-        opposite = "; else the paper contradicts itself" if found.verdict == CONTRADICTS else ""
-        lines.append(f"Reproduced if {found.rule}{opposite}.")
+        lines.append(f"Reproduced if {found.rule}.")
     counts = [row.ours.count for row in found.rows if isinstance(row.ours, Number) and row.ours.over == SEEDS]
     if found.verdict == UNDECIDED and counts and min(counts) < FEWEST_SEEDS:
         lines.append(f"Too few training seeds for a verdict: {FEWEST_SEEDS} are needed.")
@@ -117,54 +122,64 @@ def explanation(claim: Claim, found: Finding) -> list[str]:
 
 def section(number: int, claim: Claim, found: Finding) -> str:
     """A claim as Markdown."""
-    head = [f'<a id="claim-{number}"></a>', f"### {number}. {claim.statement}", "", f"{claim.where}. **{found.verdict}**"]
+    head = [f'<a id="claim-{number}"></a>', "", f"### {number}. {claim.statement}", "",
+            f"{claim.where}. **{found.verdict[0].upper()}{found.verdict[1:]}.**"]  # fmt: skip
     if found.verdict == NO_RUNS:
-        body = [f"No runs yet: `{claim.command}`", f"(lacking: {found.rule})"]
-        return "\n".join([*head, "", *body, ""])
+        return "\n".join([*head, "", f"No runs yet: `{claim.command}` ({found.rule} is lacking)", ""])
     source = f"`{claim.command}`" if claim.command else "From the paper and this project's tables alone."
     return "\n".join([*head, "", *table(found.rows), "", " ".join(explanation(claim, found)), "", source, ""])
 
 
-def contents(numbers: dict[str, list[int]]) -> str:
-    """Claims by verdict, as a table."""
-    lines = ["| verdict | claims | | that is |", "|---|---|---|---|"]
+def contents(themes: dict[str, dict[int, str]]) -> str:
+    """Claims by verdict, then by theme, as tables; themes : title -> number of the claim -> verdict."""
+    verdicts = {number: verdict for theme in themes.values() for number, verdict in theme.items()}
+    lines = [f"{len(verdicts)} claims:", "", "| verdict | claims | | that is |", "|---|---|---|---|"]
     for verdict in VERDICTS:
-        links = " ".join(f"[{number}](#claim-{number})" for number in numbers[verdict])
-        lines.append(f"| {verdict} | {len(numbers[verdict])} | {links} | {MEANING[verdict]} |")
-    return "\n".join(lines)
+        of_it = [number for number in verdicts if verdicts[number] == verdict]
+        links = " ".join(f"[{number}](#claim-{number})" for number in of_it)
+        lines.append(f"| {verdict} | {len(of_it)} | {links} | {MEANING[verdict]} |")
+    lines += ["", "| theme | claims | " + " | ".join(VERDICTS) + " |", "|---" * (2 + len(VERDICTS)) + "|"]
+    for title, theme in themes.items():
+        counts = [list(theme.values()).count(verdict) for verdict in VERDICTS]
+        cells = [f"[{title}](#claim-{min(theme)})", f"{min(theme)} - {max(theme)}", *(str(n or "") for n in counts)]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join([*lines, ""])
 
 
 def progress(results: Results) -> str:
-    """How much of every experiment has been run, as a table."""
-    lines = ["| experiment | runs | planned | what |", "|---|---|---|---|"]
+    """How much of every experiment has been run, as a table, and its studies."""
+    lines = ["| experiment | runs | planned | studies | what |", "|---|---|---|---|---|"]
     for name, what in EXPERIMENTS.items():
-        planned = [job for job in results.jobs if job.experiment == name and not job.is_study]
+        jobs = [job for job in results.jobs if job.experiment == name]
+        planned = [job for job in jobs if not job.is_study]
         there = len(planned) - sum(job.experiment == name for job in results.missing)
-        if planned:
-            lines.append(f"| `{name}` | {there} | {len(planned)} | {what} |")
+        studies = [f"`{job.script}`{'' if results.study(job.script) is not None else ' (not yet)'}"
+                   for job in jobs if job.is_study]  # fmt: skip
+        lines.append(f"| `{name}` | {there} | {len(planned)} | {', '.join(studies)} | {what} |")
     return "\n".join(lines)
 
 
-def document(results: Results) -> tuple[str, dict[str, list[int]]]:
-    """The document, and the numbers of the claims by verdict."""
-    evidence, sections, numbers, number = Evidence(results), [], defaultdict(list), 0
+def document(results: Results) -> tuple[str, Counter]:
+    """The document, and the number of claims by verdict."""
+    evidence, sections, themes, number = Evidence(results), [], {}, 0
     for theme in THEMES:
         sections.append(f"## {theme.TITLE}\n")
+        themes[theme.TITLE] = {}
         for claim in theme.CLAIMS:
             number += 1
             found = judge(claim, evidence)
-            numbers[found.verdict].append(number)
+            themes[theme.TITLE][number] = found.verdict
             sections.append(section(number, claim, found))
     runs = "## What has been run\n\n`python analysis/reproduce.py` makes all, and goes on where it stopped.\n\n"
     left_out = "".join(f"\nLeft out: {line}\n" for line in results.left_out)
-    parts = [INTRODUCTION, f"{number} claims:\n", contents(numbers) + "\n", *sections, runs + progress(results) + "\n"]
-    return "\n".join(parts) + left_out, numbers
+    text = "\n".join([INTRODUCTION, contents(themes), *sections, runs + progress(results) + "\n"]) + left_out
+    return text, Counter(verdict for theme in themes.values() for verdict in theme.values())
 
 
 def main(args: Args) -> None:
     """Write the document; print how many claims have which verdict."""
     results = Results.load(args.quick, args.runs_dir)
-    text, numbers = document(results)
+    text, counts = document(results)
     path = args.output or Path("results/quick/reproduction.md" if args.quick else "docs/reproduction.md")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -172,8 +187,8 @@ def main(args: Args) -> None:
             file.write(text.encode())
     except OSError as error:
         sys.exit(f"error: --output {path}: cannot write there ({error.strerror})")
-    counts = ", ".join(f"{len(numbers[verdict])} {verdict}" for verdict in VERDICTS if numbers[verdict])
-    print(f"{path}: {sum(map(len, numbers.values()))} claims of the paper; {counts}")
+    of_each = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+    print(f"{path}: {counts.total()} claims of the paper; {of_each}")
 
 
 if __name__ == "__main__":

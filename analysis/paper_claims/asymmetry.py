@@ -51,7 +51,7 @@ def rows_of(evidence, weight: float, papers: str) -> list[Row]:
 
 
 @claim("Agents trained for carbon alone learn fast.", "Section 4.2, figure 2a", FIXED,
-       why="EUPG without a baseline weighs every action of an episode by its whole return, most of which is the site's.")
+       why="EUPG has no baseline: it weighs every action by the episode's whole return, much of which is the site's.")
 def carbon_is_learnt(evidence):
     share = seeds(share_learnt(evidence, CARBON))
     return finding(rows_of(evidence, CARBON, "rises"), above(share, PART, what="the share learnt"))

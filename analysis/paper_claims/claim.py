@@ -124,8 +124,6 @@ def above(number: Number, limit: float = 0.0, papers: float | None = None, what:
     """Holds if the interval lies above the limit; not if below, or if it has the limit but not the paper's value."""
     low, high = number.ends
     rule = f"{what} lies above {short(limit)}"
-    if papers is not None:
-        rule += f"; not if it lies below, or has {short(limit)} in it but not the paper's {short(papers)}"
     if not number.decides:
         return Answer(None, rule)
     fails = high <= limit or (papers is not None and low <= limit and high < papers)
@@ -136,19 +134,21 @@ def below(number: Number, limit: float = 0.0, papers: float | None = None, what:
     """Holds if the interval lies below the limit; not if above, or if it has the limit but not the paper's value."""
     mirrored = Number(-number.value, -number.high, -number.low, number.over, number.count)
     holds = above(mirrored, -limit, None if papers is None else -papers).holds
-    rule = f"{what} lies below {short(limit)}"
-    if papers is not None:
-        rule += f"; not if it lies above, or has {short(limit)} in it but not the paper's {short(papers)}"
-    return Answer(holds, rule)
+    return Answer(holds, f"{what} lies below {short(limit)}")
 
 
 def within(number: Number, low: float, high: float, what: str = "the value") -> Answer:
     """Holds if the value lies in a range; not if the whole interval lies outside."""
-    rule = f"{what} lies between {short(low)} and {short(high)}; not if its whole interval lies outside"
+    rule = f"{what} lies between {short(low)} and {short(high)}"
     if not number.decides:
         return Answer(None, rule)
     outside = number.ends[1] < low or number.ends[0] > high
     return Answer(True if low <= number.value <= high else False if outside else None, rule)
+
+
+def equals(value: float, wanted: float, what: str) -> Answer:
+    """Holds if a count is the wanted one."""
+    return Answer(bool(value == wanted), f"{what} is {short(wanted)}")
 
 
 def about(number: Number, low: float, high: float | None = None, what: str = "the value") -> Answer:

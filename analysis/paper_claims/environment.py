@@ -4,7 +4,7 @@ import numpy as np
 
 import boreal_env
 import sim
-from analysis.paper_claims.claim import CONTRADICTS, Number, Row, about, claim, finding, within
+from analysis.paper_claims.claim import CONTRADICTS, Number, Row, about, all_of, claim, equals, finding, within
 from analysis.paper_claims.evidence import FRONTS, PAPER_ALONE, VARIANCE
 from analysis.tables.common import paper
 from sim.state import DAYS
@@ -16,16 +16,17 @@ STEP_MINUTES = 30
 OPTIMUM = 50.0
 
 
-@claim("The 25 actions are unique: five density changes times five conifer fractions.", "Section 3.2; table of actions",
+@claim("The 25 actions are unique: five density changes times five conifer fractions.",
+       "Section 3.2; table of actions",
        PAPER_ALONE,
-       why="Planting and thinning are the only ways in which an action reaches the stand (the paper's own timeline of a "
-           "year). Without a change of density the conifer fraction has nothing to act on, so those actions are one.")
+       why="Planting and thinning are the only ways in which an action reaches the stand, in the paper's timeline of a "
+           "year too. Without either the conifer fraction has nothing to act on, so those actions are one.")
 def unique_actions(evidence):
     density, mix = sim.management.decode(np.arange(sim.management.NUM_ACTIONS))
     different = len({(d, m if d else None) for d, m in zip(density, mix, strict=True)})
     codes = Number(sim.management.NUM_ACTIONS)
     rows = [Row("codes of actions", "25", codes), Row("actions that can differ in effect", "25", Number(different))]
-    return finding(rows, about(Number(different), 25, what="the number of different actions"), CONTRADICTS)
+    return finding(rows, equals(different, 25, "the number of different actions"), CONTRADICTS)
 
 
 @claim("An observation has 105 entries, 43 without the site's parameters.", "Table 1; table of the observation")
@@ -34,8 +35,8 @@ def observation_entries(evidence):
     own = entries - len(sim.SITE_PARAMETERS)
     rows = [Row("entries", f"{sum(COMPONENTS)} by its components", Number(entries)),
             Row("entries without the site", f"{sum(COMPONENTS[:-1])} by its components", Number(own))]
-    same = sum(COMPONENTS) - entries + abs(sum(COMPONENTS[:-1]) - own)
-    return finding(rows, within(Number(same), 0, 0, "the difference to the sum of the components"))
+    whole = equals(sum(COMPONENTS), entries, "the sum of the components")
+    return finding(rows, all_of(whole, equals(sum(COMPONENTS[:-1]), own, "that without the site's")))
 
 
 @claim("The sampling ranges of the site's parameters are listed comprehensively.", "Table of sampling ranges",
@@ -44,14 +45,14 @@ def listed_parameters(evidence):
     listed = Number(sum("table of sampling ranges" in one.source for one in sim.SITE_PARAMETERS.values()))
     rows = [Row("site parameters in the observation", str(COMPONENTS[-1]), Number(len(sim.SITE_PARAMETERS))),
             Row("of them with a range in the paper", "all", listed)]
-    return finding(rows, within(listed, COMPONENTS[-1], COMPONENTS[-1], "the number listed"), CONTRADICTS)
+    return finding(rows, equals(listed.value, COMPONENTS[-1], "the number listed"), CONTRADICTS)
 
 
 @claim("A year is 17,520 steps of the physics.", "Appendix, runtime")
 def steps_of_a_year(evidence):
     ours = Number(DAYS * 24 * 60 // STEP_MINUTES)
     papers = paper("runtime", index_col="quantity").loc["physics_steps_per_year", "low"]
-    return finding([Row("steps a year", f"{papers:,.0f}", ours)], within(ours, papers, papers))
+    return finding([Row("steps a year", f"{papers:,.0f}", ours)], equals(ours.value, papers, "the number"))
 
 
 @claim("Both rewards have comparable scales for optimisation.", "Appendix, reward function", VARIANCE,

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from analysis.mechanism_pairs import PAIRS
-from analysis.paper_claims.claim import Missing, Number, Row, about, above, all_of, below, claim, finding, within
+from analysis.paper_claims.claim import Missing, Number, Row, about, above, all_of, below, claim, finding, short, within
 from analysis.paper_claims.evidence import FRONTS, difference, mean_of, only, optional, seeds
 from analysis.tables.common import mean_of_years, paper
 from analysis.tables.growing_season_correlations import SEASON_PAIRS, correlations
@@ -36,7 +36,7 @@ def asymmetric_is_hardest(evidence):
     apart = {name: difference(own[name].scalarized, own["asymmetric"].scalarized)
              for name in ("contrast", "raw_degree_days")}  # fmt: skip
     rows = [Row(f"scalarised, {name.replace('_', ' ')} less asymmetric",
-                f"{table[name] - table['asymmetric']:.1f}", apart[name]) for name in apart]
+                short(table[name] - table["asymmetric"]), apart[name]) for name in apart]
     rows += [Row(f"gain over zero change, {name.replace('_', ' ')}", "",
                  optional(lambda name=name: seeds(own[name].get("gain_scalarized", pd.Series(dtype=float)))))
              for name in own]  # fmt: skip
@@ -51,9 +51,10 @@ def asymmetric_avoids_warming(evidence):
     column = "boundary_warming_mj_m2"
     flux = {name: formulation(evidence, name, warming)[column] for name in ("asymmetric", "raw_degree_days")}
     apart = difference(flux["raw_degree_days"], flux["asymmetric"])
-    rows = [Row(f"warming, {name.replace('_', ' ')} [MJ/m2/yr]", f"{table[name]:g}", seeds(flux[name])) for name in flux]
+    rows = [Row(f"warming, {name.replace('_', ' ')} [MJ/m2/yr]", short(table[name]), seeds(flux[name]))
+            for name in flux]
     papers = table["raw_degree_days"] - table["asymmetric"]
-    rows.append(Row("raw degree-days less asymmetric", f"{papers:.1f}", apart))
+    rows.append(Row("raw degree-days less asymmetric", short(papers), apart))
     return finding(rows, above(apart, papers=papers, what="the difference"))
 
 
@@ -75,7 +76,8 @@ def correlation_claim(variable: str, statement: str, why: str):
 
     @claim(statement, "Section 4.4, table of correlations", MAIN, why=why)
     def correlated(evidence):
-        tables = {script: evidence.by_seed(correlations, "main", script) for script in ("ppo_curriculum", "zero_change")}
+        tables = {script: evidence.by_seed(correlations, "main", script)
+                  for script in ("ppo_curriculum", "zero_change")}  # fmt: skip
         ours = seeds(tables["ppo_curriculum"][variable].astype(float))
         rows = [Row("r, Curriculum PPO", f"{papers[name]:+.2f}".replace("-", "−"), ours),
                 Row("r, zero change", "", Number(tables["zero_change"][variable].iloc[0]))]
@@ -92,7 +94,8 @@ SEASON_CORRELATIONS = (
     correlation_claim("thaw_return", "Longer growing seasons go with better thaw protection (r = +0.65).",
                       ACROSS + " Mild air above a boundary of fixed temperature drives heat down."),
     correlation_claim("latent_heat_mj_m2", "Longer growing seasons go with more transpiration (r = +0.82).", ACROSS),
-    correlation_claim("ground_shortwave_mj_m2", "Longer growing seasons go with less radiation on the ground (r = −0.75).",
+    correlation_claim("ground_shortwave_mj_m2",
+                      "Longer growing seasons go with less radiation on the ground (r = −0.75).",
                       ACROSS + " Days without snow let more sunlight reach the ground."),
 )  # fmt: skip
 
@@ -105,8 +108,8 @@ def effect(evidence, pair: str, variable: str) -> Number:
 
 
 @claim("A longer growing season protects permafrost: leaves for more days.", "Section 4.4, figure 4d", STUDY,
-       note="Where the paper correlates across sites, this changes one thing: the dates of leaves, on the same sites and "
-            "weathers. Stands are left alone.")
+       note="Where the paper correlates across sites, this changes one thing: the dates of leaves, on the same sites "
+            "and weathers. Stands are left alone.")
 def season_of_leaves(evidence):
     pair = SEASON_PAIRS["leaves"]
     ours = effect(evidence, pair, "thaw_return")
@@ -164,15 +167,16 @@ CONFLICTS = (
                    "conflict directly.", opposed,
                    "Deciduous trees close their canopy sooner and use light better, so carbon asks for them. Conifers "
                    "build the thicker organic layer, which insulates more when thawed than when frozen; without it "
-                   "deciduous trees protect better at most sites tried (`docs/model.md`, where the objectives conflict)."),
+                   "deciduous trees protect better at most sites tried (see where the objectives conflict, in "
+                   "`docs/model.md`)."),
     conflict_claim("LAI", "LAI", "More leaf area serves both objectives.", together,
                    ""),
 )  # fmt: skip
 
 
 @claim("Carbon and permafrost conflict: management has to trade one for the other.", "Abstract; section 4.3", FRONTS,
-       note="Non-dominated plans of single sites, found by NSGA-II; extents are between the ends of a front, and count if "
-            "both are larger than twice their standard error.")
+       note="Non-dominated plans of single sites, found by NSGA-II; extents are between the ends of a front, and count "
+            "if both are larger than twice their standard error.")
 def trade_off(evidence):
     fronts = evidence.beside("fronts/summary.csv")
     wide = ((fronts.carbon_extent > 2 * fronts.carbon_extent_error)

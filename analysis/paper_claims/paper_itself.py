@@ -188,7 +188,8 @@ def violations_by_chance(evidence):
         rows.append(Row(f"{NAMES.get(method, 'Fixed λ EUPG')}, {pairs} pairs", f"{short(printed[method])} %",
                         f"noise: {short(expected)} % on average; as few or fewer in {short(100 * chance)} % of cases"))
     chance = chance_of_at_most(printed["curriculum_ppo"], PAIRS["curriculum_ppo"])
-    return finding(rows, Answer(chance < 0.05, "noise has as few violations as the curriculum in less than 5 % of cases"))
+    rule = "noise has as few violations as the curriculum in less than 5 % of cases"
+    return finding(rows, Answer(chance < 0.05, rule))
 
 
 @claim("Training takes 8 to 12 hours at 5 to 7 seconds an episode.", "Appendix, runtime")

@@ -4,8 +4,8 @@ import pandas as pd
 
 from analysis import metrics
 from analysis.paper_claims.asymmetry import share
-from analysis.paper_claims.claim import Missing, Row, about, above, all_of, below, claim, finding, opposite
-from analysis.paper_claims.evidence import difference, first_and_last, mean_of, only, optional, seeds
+from analysis.paper_claims.claim import Missing, Row, about, above, all_of, below, claim, finding, opposite, short
+from analysis.paper_claims.evidence import difference, first_and_last, main_metrics, mean_of, only, optional, seeds
 from analysis.results import METHODS as PAPER_NAMES
 from analysis.results import TITLES
 from analysis.tables.common import paper
@@ -36,7 +36,10 @@ def value_claim(script: str):
     def scalarised_value(evidence):
         ours, papers = seeds(scalarised(evidence, script)), published(script).scalarized_mean
         gain = optional(lambda: seeds(evidence.metric("gain_scalarized", "main", script)))
-        rows = [Row("scalarised return", f"{papers:g}", ours), Row("the same less zero change, same episodes", "", gain)]
+        rows = [Row("scalarised return", short(papers), ours),
+                Row("the same less zero change, same episodes", "", gain),
+                Row("share of the site in the variance of thaw returns (`analysis/variance.py`)", "",
+                    optional(lambda: share(evidence, "thaw", "site")))]
         return finding(rows, about(ours, papers))
 
     return scalarised_value
@@ -48,7 +51,7 @@ def value_claim(script: str):
 def curriculum_beats_gated(evidence):
     papers = published(CURRICULUM).scalarized_mean - published(GATED).scalarized_mean
     apart = difference(scalarised(evidence, CURRICULUM), scalarised(evidence, GATED))
-    return finding([Row("scalarised, Curriculum less Gated", f"{papers:.1f}", apart)], above(apart, papers=papers))
+    return finding([Row("scalarised, Curriculum less Gated", short(papers), apart)], above(apart, papers=papers))
 
 
 @claim("PPO Gated is better than Variable λ EUPG.", "Table 2, figure 3b", MAIN,
@@ -56,16 +59,16 @@ def curriculum_beats_gated(evidence):
 def gated_beats_eupg(evidence):
     papers = published(GATED).scalarized_mean - published(EUPG).scalarized_mean
     apart = difference(scalarised(evidence, GATED), scalarised(evidence, EUPG))
-    return finding([Row("scalarised, Gated less EUPG", f"{papers:.1f}", apart)], above(apart, papers=papers))
+    return finding([Row("scalarised, Gated less EUPG", short(papers), apart)], above(apart, papers=papers))
 
 
 @claim("Curriculum PPO outperforms PPO Gated in training too.", "Section 4.3, figure 3a", MAIN,
-       why="The same seed gives both the same sites, weathers and preferences; what is left is the policies' difference.")
+       why="The same seed gives both the same sites, weathers and preferences: what differs is what was trained on.")
 def curriculum_leads_in_training(evidence):
     papers = published(CURRICULUM).scalarized_mean - published(GATED).scalarized_mean
     late = {script: evidence.by_seed(late_training, "main", script)["late"] for script in (CURRICULUM, GATED)}
     apart = difference(late[CURRICULUM], late[GATED])
-    rows = [Row("scalarised return in the last tenth, Curriculum less Gated", f"about {papers:.1f}", apart)]
+    rows = [Row("scalarised return in the last tenth, Curriculum less Gated", f"about {short(papers)}", apart)]
     return finding(rows, above(apart, papers=papers))
 
 
@@ -82,9 +85,9 @@ def curriculum_beats_heuristics(evidence):
     papers_best = max(published(script).scalarized_mean for script in HEURISTICS)
     papers = published(CURRICULUM).scalarized_mean - papers_best
     apart = seeds(scalarised(evidence, CURRICULUM) - scalarised(evidence, best).iloc[0])
-    rows = [Row(f"scalarised, {TITLES[script]}", f"{published(script).scalarized_mean:g}",
+    rows = [Row(f"scalarised, {TITLES[script]}", short(published(script).scalarized_mean),
                 optional(lambda script=script: seeds(scalarised(evidence, script)))) for script in HEURISTICS]
-    rows.append(Row("Curriculum less the best of them", f"{papers:.1f}", apart))
+    rows.append(Row("Curriculum less the best of them", short(papers), apart))
     return finding(rows, above(apart, papers=papers, what="the difference"))
 
 
@@ -102,7 +105,7 @@ def gain(evidence, script: str):
 def planting_is_worst(evidence):
     papers = published("plus_100").scalarized_mean - published("zero_change").scalarized_mean
     ours = gain(evidence, "plus_100")
-    return finding([Row("scalarised, +100 a year less zero change", f"{papers:.1f}", ours)], below(ours, papers=papers))
+    return finding([Row("scalarised, +100 a year less zero change", short(papers), ours)], below(ours, papers=papers))
 
 
 @claim("Steering to 1000 stems/ha, mixed or of conifers, is much better than doing nothing.", "Table 2", MAIN)
@@ -110,13 +113,15 @@ def targets_are_better(evidence):
     numbers = {script: gain(evidence, script) for script in ("target_density", "conifer_restoration")}
     zero = published("zero_change").scalarized_mean
     rows = [Row(f"scalarised, {TITLES[script]} less zero change",
-                f"{published(script).scalarized_mean - zero:.1f}", number) for script, number in numbers.items()]
+                short(published(script).scalarized_mean - zero), number) for script, number in numbers.items()]
     return finding(rows, all_of(*(above(number) for number in numbers.values())))
 
 
-@claim("Curriculum PPO's trade-offs cover more than PPO Gated's: hypervolume 84.3 against 23.6.", "Table 2, figure 3c, d",
-       MAIN, why="A policy that does the same at every weight covers one point; the hypervolume is then that of its gain.",
-       note="The paper's metric is of returns above (−2, −2). No thaw return of ours lies there, so we compare gains.")
+@claim("Curriculum PPO's trade-offs cover more than PPO Gated's: hypervolume 84.3 against 23.6.",
+       "Table 2, figure 3c, d", MAIN,
+       why="A policy that does the same at every weight covers one point; the hypervolume is then that of its gain.",
+       note="The paper's metric is of returns above its reference point, and zero if none of ours lies there; so gains "
+            "are compared.")
 def coverage(evidence):
     returns = {script: seeds(evidence.metric("hypervolume", "main", script)) for script in (CURRICULUM, GATED)}
     gains = {script: evidence.metric("gain_hypervolume", "main", script) for script in (CURRICULUM, GATED)}
@@ -138,17 +143,27 @@ def heuristics_miss_the_front(evidence):
     return finding(rows, above(apart, what="the difference"))
 
 
+def change(evidence, name: str, experiment: str, script: str, **flags) -> pd.Series:
+    """Change of a return from weight 0 to 1 by training seed; 0 of a policy that does the same at every weight."""
+    table = evidence.by_seed(main_metrics, experiment, script, **flags)
+    return table.reindex(columns=[f"{name}_change"]).iloc[:, 0].fillna(0.0)
+
+
 def follows(evidence, experiment: str, script: str, **flags):
-    """Change of both returns from weight 0 to 1, and whether both have the sign that the preference asks for."""
-    carbon, thaw = (seeds(evidence.metric(f"{name}_change", experiment, script, **flags)) for name in ("carbon", "thaw"))
-    return carbon, thaw, all_of(above(carbon, what="carbon's change"), below(thaw, what="thaw's change"))
+    """Change of both returns from weight 0 to 1, and whether both have the sign that the preference asks for.
+
+    Not, if zero is in an interval and the change of the paper's curriculum is not.
+    """
+    carbon, thaw = (seeds(change(evidence, name, experiment, script, **flags)) for name in ("carbon", "thaw"))
+    papers = paper_change(CURRICULUM)
+    return carbon, thaw, all_of(above(carbon, papers=papers[0], what="carbon's change"),
+                                below(thaw, papers=papers[1], what="thaw's change"))  # fmt: skip
 
 
-def paper_change(script: str) -> tuple[str, str]:
-    """The same change in the paper's details, as text."""
-    table = paper("detailed_objectives").query("method == @method", local_dict={"method": PAPER_NAMES[script]})
-    ends = table.sort_values("lambda_carbon").iloc[[0, -1]]
-    return tuple(f"{ends[f'{name}_mean'].diff().iloc[-1]:.1f}".replace("-", "−") for name in ("carbon", "thaw"))
+def paper_change(script: str) -> tuple[float, float]:
+    """The same change in the paper's details."""
+    table = paper("detailed_objectives", index_col="method").loc[PAPER_NAMES[script]].sort_values("lambda_carbon")
+    return tuple(table[f"{name}_mean"].iloc[-1] - table[f"{name}_mean"].iloc[0] for name in ("carbon", "thaw"))
 
 
 @claim("Curriculum PPO follows the preference.", "Figure 3d; table of detailed objectives", MAIN,
@@ -157,10 +172,10 @@ def paper_change(script: str) -> tuple[str, str]:
 def curriculum_follows(evidence):
     carbon, thaw, answer = follows(evidence, "main", CURRICULUM)
     papers = paper_change(CURRICULUM)
-    rows = [Row("carbon return, weight 1 less weight 0", papers[0], carbon),
-            Row("thaw return, weight 1 less weight 0", papers[1], thaw)]
+    rows = [Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
+            Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw)]
     rows += [Row(f"{name} of PPO Gated with per-objective advantages", "", optional(lambda name=name: seeds(
-        evidence.metric(f"{name}_change", "variants", GATED, ent_coef=0.0, per_objective_advantages=True))))
+        change(evidence, name, "variants", GATED, ent_coef=0.0, per_objective_advantages=True))))
         for name in ("carbon", "thaw")]  # fmt: skip
     return finding(rows, answer)
 
@@ -170,8 +185,8 @@ def curriculum_follows(evidence):
 def gated_does_not_follow(evidence):
     carbon, thaw, answer = follows(evidence, "main", GATED)
     papers = paper_change(GATED)
-    rows = [Row("carbon return, weight 1 less weight 0", papers[0], carbon),
-            Row("thaw return, weight 1 less weight 0", papers[1], thaw)]
+    rows = [Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
+            Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw)]
     return finding(rows, opposite(answer))
 
 
@@ -180,7 +195,7 @@ def violation(evidence, script: str, name: str = "violations_percent") -> pd.Ser
     experiment = "fixed" if script == "eupg_fixed_lambda" else "main"
     table = evidence.by_seed(violations, experiment, script)
     if name not in table:
-        raise Missing("two weights or more")
+        raise Missing("a policy that differs between weights")
     return table[name].dropna()
 
 
@@ -196,19 +211,22 @@ def curriculum_violates_least(evidence):
             papers = "" if what else f"{printed[PAPER_NAMES[script]]:g}"
             ours = optional(lambda script=script, name=name: seeds(violation(evidence, script, name)))
             rows.append(Row(f"violations %, {TITLES[script]}{what}", papers, ours))
-    lower = [difference(violation(evidence, CURRICULUM), violation(evidence, other)) for other in (GATED, EUPG)]
-    rows += [Row(f"Curriculum less {TITLES[other]}", "below 0", number)
-             for other, number in zip((GATED, EUPG), lower, strict=True)]
-    return finding(rows, all_of(*(below(number, what="the difference to either") for number in lower)))
+    answers = []
+    for other in (GATED, EUPG):
+        papers = printed[PAPER_NAMES[CURRICULUM]] - printed[PAPER_NAMES[other]]
+        apart = difference(violation(evidence, CURRICULUM), violation(evidence, other))
+        rows.append(Row(f"Curriculum less {TITLES[other]}", short(papers), apart))
+        answers.append(below(apart, papers=papers, what="the difference to either"))
+    return finding(rows, all_of(*answers))
 
 
 @claim("PPO Gated violates λ-monotonicity in every pair of weights.", "Appendix, λ-monotonicity", MAIN,
-       why="A policy that ignores the preference violates three pairs of four by chance if its returns are independent, "
-           "more if they rise and fall together between weights.")
+       why="A policy that ignores the preference violates three pairs of four by chance if its returns are "
+           "independent, more if they rise and fall together between weights.")
 def gated_always_violates(evidence):
     ours = seeds(violation(evidence, GATED))
     papers = paper("monotonicity_violations", index_col="method").violations_percent["ppo_gated"]
-    rows = [Row("violations %", f"{papers:g}", ours),
+    rows = [Row("violations %", short(papers), ours),
             Row("in random order %", "", seeds(violation(evidence, GATED, "noise_violations_percent")))]
     return finding(rows, about(ours, papers))
 
@@ -220,13 +238,13 @@ def curriculum_beats_chance(evidence):
     return finding([Row("violations %, less those in random order", "", apart)], below(apart, what="the difference"))
 
 
-@claim("Curriculum PPO cools the ground at every weight: mean thaw returns of 7.3 to 8.1.", "Table of detailed objectives",
-       MAIN, why=LEVEL)
+@claim("Curriculum PPO cools the ground at every weight: mean thaw returns of 7.3 to 8.1.",
+       "Table of detailed objectives", MAIN, why=LEVEL)
 def thaw_is_positive(evidence):
     lowest = seeds(evidence.by_seed(lowest_thaw, "main", CURRICULUM)["lowest"])
     zero = optional(lambda: seeds(evidence.by_seed(lowest_thaw, "main", "zero_change")["lowest"]))
     papers = paper("detailed_objectives").query("method == 'curriculum_ppo'").thaw_mean.min()
-    rows = [Row("lowest mean thaw return of any weight", f"{papers:g}", lowest), Row("of zero change", "", zero)]
+    rows = [Row("lowest mean thaw return of any weight", short(papers), lowest), Row("of zero change", "", zero)]
     return finding(rows, above(lowest))
 
 
@@ -235,7 +253,8 @@ def lowest_thaw(one) -> dict:
     return {"lowest": metrics.mean_returns(one.evaluation).thaw_return.min()}
 
 
-@claim("Curriculum PPO's reward scatters half as much between episodes as PPO Gated's (3.0 against 6.0).", "Table 2", MAIN,
+@claim("Curriculum PPO's reward scatters half as much between episodes as PPO Gated's (3.0 against 6.0).", "Table 2",
+       MAIN,
        why="Evaluated on the same sites, methods scatter alike: the scatter is the sites'.")
 def curriculum_scatters_less(evidence):
     scatter = {script: evidence.metric("sd_over_episodes", "main", script) for script in (CURRICULUM, GATED)}

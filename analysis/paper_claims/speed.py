@@ -9,7 +9,7 @@ from analysis.tables.runtime import hours, published
 
 TITLE = "Time, memory and cost"
 PYTHON_BACKEND, WORKERS = "50-year episode, python backend", 16
-# On demand, Linux, us-east-1: docs.aws.amazon.com, Amazon EC2 Auto Scaling user guide, example of prices by instance hour
+# On demand, Linux, us-east-1: docs.aws.amazon.com, Amazon EC2 Auto Scaling user guide, prices by instance hour
 DOLLARS_PER_HOUR = 0.68
 FASTER = "Holds if ours takes no more than the paper's range: what is claimed is that it can be afforded."
 
@@ -43,8 +43,7 @@ def episode(evidence):
 
 
 @claim("The same takes 12 to 15 s in pure Python.", "Appendix, runtime", BENCHMARK,
-       note="`analysis/benchmark.py` does not time the uncompiled backend, which is there to be read and compared with; a "
-            "row of that name in its table would be read here.")
+       note="`analysis/benchmark.py` does not time the uncompiled backend, which is there to be compared with.")
 def pure_python(evidence):
     name = "episode_50_years_pure_python"
     try:
@@ -119,8 +118,8 @@ def memory_of_all(evidence):
 
 
 @claim("A training costs one dollar of cloud computing (c5.4xlarge).", "Appendix, runtime", only("main"),
-       note="For the whole machine of sixteen virtual cores (on demand, Linux, Northern Virginia; the price is from AWS's "
-            "documentation of Auto Scaling), though a training of ours uses one of them; evaluation included.")
+       note="For the whole machine of sixteen virtual cores (on demand, Linux, Northern Virginia; the price is from "
+            "AWS's documentation of Auto Scaling), though a training of ours uses one of them; evaluation included.")
 def dollars(evidence):
     spent = pd.Series([DOLLARS_PER_HOUR * (hours(run)["training"] + hours(run)["evaluation"])
                        for one in evidence.replicates("main", "ppo_curriculum") for run in one.runs])
