@@ -21,6 +21,7 @@ from analysis.paper_claims import (
     mechanisms,
     paper_itself,
     performance,
+    preference,
     speed,
     strategies,
 )
@@ -30,7 +31,6 @@ from analysis.paper_claims.claim import (
     NO_RUNS,
     NOT_REPRODUCED,
     REPRODUCED,
-    SEEDS,
     UNDECIDED,
     UNTESTABLE,
     VERDICTS,
@@ -42,7 +42,7 @@ from analysis.paper_claims.claim import (
 from analysis.paper_claims.evidence import Evidence
 from analysis.results import Results
 
-THEMES = (environment, asymmetry, performance, curriculum, mechanisms, strategies, speed, paper_itself)
+THEMES = (environment, asymmetry, performance, preference, curriculum, mechanisms, strategies, speed, paper_itself)
 MEANING = {
     REPRODUCED: "our numbers meet the rule that the claim names",
     NOT_REPRODUCED: "they meet its opposite",
@@ -110,8 +110,7 @@ def explanation(claim: Claim, found: Finding) -> list[str]:
     lines = []
     if found.rule and found.verdict != UNTESTABLE:
         lines.append(f"Reproduced if {found.rule}.")
-    counts = [row.ours.count for row in found.rows if isinstance(row.ours, Number) and row.ours.over == SEEDS]
-    if found.verdict == UNDECIDED and counts and min(counts) < FEWEST_SEEDS:
+    if found.waits:
         lines.append(f"Too few training seeds for a verdict: {FEWEST_SEEDS} are needed.")
     if found.verdict in (NOT_REPRODUCED, CONTRADICTS) and claim.why:
         lines.append(f"Why: {claim.why}")

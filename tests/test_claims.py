@@ -10,7 +10,7 @@ from tiny_runs import TINY_RUNS, write_run
 from analysis import claims, experiments, stored
 from analysis.constant_plans import PLANTING
 from analysis.mechanism_pairs import MEANS, PAIRS
-from analysis.paper_claims import asymmetry, curriculum, environment, paper_itself, performance, speed
+from analysis.paper_claims import asymmetry, curriculum, environment, paper_itself, performance, preference, speed
 from analysis.paper_claims.claim import (
     CONTRADICTS,
     NO_RUNS,
@@ -71,6 +71,7 @@ def test_ranges_and_several_parts():
     assert [all_of(yes, one).holds for one in (yes, open_, no)] == [True, None, False]
     assert all_of(open_, no).holds is False
     assert [opposite(one).holds for one in (yes, no, open_)] == [False, True, None]
+    assert all_of(yes, above(seeds(1, 0.5, 2, count=2))).waits and not all_of(yes, above(seeds(0, -1, 1))).waits
 
 
 def test_numbers_as_text():
@@ -125,7 +126,7 @@ def test_one_seed_is_no_verdict():
     assert ours["scalarised return"].value == pytest.approx(5 / 3) and ours["scalarised return"].count == 1
     assert ours["the same less zero change, same episodes"].value == pytest.approx(5 / 3)  # (1 + 1 + 3) / 3
     assert ours["share of the site in the variance of thaw returns (`analysis/variance.py`)"] == "no runs yet"
-    finding, ours = found(performance.curriculum_follows, TINY_RUNS)
+    finding, ours = found(preference.curriculum_follows, TINY_RUNS)
     assert [ours[f"{name} return, weight 1 less weight 0"].value for name in ("carbon", "thaw")] == [2, -2]
 
 
@@ -148,8 +149,8 @@ def test_three_seeds_are(three_seeds):
     assert ours["scalarised, Curriculum less Gated"].value == pytest.approx(3.9)
     assert found(performance.gated_beats_eupg, three_seeds)[0].verdict == NO_RUNS
     # the same at every weight: it does not follow the preference
-    assert found(performance.gated_does_not_follow, three_seeds)[0].verdict == REPRODUCED
-    assert found(performance.curriculum_follows, three_seeds)[0].verdict == NOT_REPRODUCED
+    assert found(preference.gated_does_not_follow, three_seeds)[0].verdict == REPRODUCED
+    assert found(preference.curriculum_follows, three_seeds)[0].verdict == NOT_REPRODUCED
 
 
 def test_no_difference_is_not_reproduced(tmp_path):
@@ -158,9 +159,9 @@ def test_no_difference_is_not_reproduced(tmp_path):
             write_run(tmp_path / f"{script}{seed}", script, seed, (1, 2, 4), (3, 2, 1), vectorization="lockstep")
     finding, ours = found(performance.curriculum_beats_gated, tmp_path)
     assert ours["scalarised, Curriculum less Gated"].ends == (0, 0) and finding.verdict == NOT_REPRODUCED
-    assert found(performance.curriculum_follows, tmp_path)[0].verdict == REPRODUCED
-    assert found(performance.gated_does_not_follow, tmp_path)[0].verdict == NOT_REPRODUCED
-    finding, ours = found(performance.gated_always_violates, tmp_path)
+    assert found(preference.curriculum_follows, tmp_path)[0].verdict == REPRODUCED
+    assert found(preference.gated_does_not_follow, tmp_path)[0].verdict == NOT_REPRODUCED
+    finding, ours = found(preference.gated_always_violates, tmp_path)
     assert ours["violations %"].value == 0 and finding.verdict == NOT_REPRODUCED
 
 

@@ -79,6 +79,7 @@ class Answer:
 
     holds: bool | None
     rule: str
+    waits: bool = False  # for more training seeds
 
 
 @dataclass(frozen=True)
@@ -88,12 +89,13 @@ class Finding:
     rows: list[Row]
     verdict: str
     rule: str = ""
+    waits: bool = False
 
 
 def finding(rows: list[Row], answer: Answer, otherwise: str = NOT_REPRODUCED) -> Finding:
     """The finding of an answer; `otherwise` is the verdict on a claim that does not hold."""
     verdict = UNDECIDED if answer.holds is None else REPRODUCED if answer.holds else otherwise
-    return Finding(rows, verdict, answer.rule)
+    return Finding(rows, verdict, answer.rule, answer.waits)
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ def above(number: Number, limit: float = 0.0, papers: float | None = None, what:
     low, high = number.ends
     rule = f"{what} lies above {short(limit)}"
     if not number.decides:
-        return Answer(None, rule)
+        return Answer(None, rule, waits=True)
     fails = high <= limit or (papers is not None and low <= limit and high < papers)
     return Answer(True if low > limit else False if fails else None, rule)
 
@@ -133,15 +135,15 @@ def above(number: Number, limit: float = 0.0, papers: float | None = None, what:
 def below(number: Number, limit: float = 0.0, papers: float | None = None, what: str = "the interval") -> Answer:
     """Holds if the interval lies below the limit; not if above, or if it has the limit but not the paper's value."""
     mirrored = Number(-number.value, -number.high, -number.low, number.over, number.count)
-    holds = above(mirrored, -limit, None if papers is None else -papers).holds
-    return Answer(holds, f"{what} lies below {short(limit)}")
+    answer = above(mirrored, -limit, None if papers is None else -papers)
+    return Answer(answer.holds, f"{what} lies below {short(limit)}", answer.waits)
 
 
 def within(number: Number, low: float, high: float, what: str = "the value") -> Answer:
     """Holds if the value lies in a range; not if the whole interval lies outside."""
     rule = f"{what} lies between {short(low)} and {short(high)}"
     if not number.decides:
-        return Answer(None, rule)
+        return Answer(None, rule, waits=True)
     outside = number.ends[1] < low or number.ends[0] > high
     return Answer(True if low <= number.value <= high else False if outside else None, rule)
 
@@ -159,11 +161,12 @@ def about(number: Number, low: float, high: float | None = None, what: str = "th
 
 def opposite(answer: Answer) -> Answer:
     """Holds if the answer does not."""
-    return Answer(None if answer.holds is None else not answer.holds, f"not so that {answer.rule}")
+    return Answer(None if answer.holds is None else not answer.holds, f"this fails: {answer.rule}", answer.waits)
 
 
 def all_of(*answers: Answer) -> Answer:
     """Holds if all do, not if one does not."""
     holds = [answer.holds for answer in answers]
     rule = " and ".join(dict.fromkeys(answer.rule for answer in answers))
-    return Answer(False if False in holds else None if None in holds else True, rule)
+    decided = False if False in holds else None if None in holds else True
+    return Answer(decided, rule, decided is None and any(answer.waits for answer in answers))

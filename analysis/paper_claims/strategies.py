@@ -8,6 +8,7 @@ from analysis.paper_claims.claim import (
     UNTESTABLE,
     Finding,
     Missing,
+    Number,
     Row,
     about,
     above,
@@ -18,7 +19,8 @@ from analysis.paper_claims.claim import (
     short,
 )
 from analysis.paper_claims.evidence import difference, only, optional, seeds
-from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED, change
+from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED
+from analysis.paper_claims.preference import change
 from analysis.results import TITLES
 from analysis.tables.common import paper
 from analysis.tables.learned_strategies import numbers
@@ -83,7 +85,8 @@ def eupg_does_little(evidence):
             for script in (EUPG, GATED, "random_valid")}  # fmt: skip
     apart = seeds(done[EUPG] / done["random_valid"].iloc[0])
     rows = [Row(f"planted and thinned [stems/ha/yr], {TITLES[script]}", "minimal" if script == EUPG else "",
-                seeds(done[script])) for script in done]
+                seeds(done[script])) for script in (EUPG, GATED)]
+    rows.append(Row("of random valid actions", "", Number(done["random_valid"].iloc[0])))
     rows.append(Row("EUPG over random valid actions", "below 1", apart))
     return finding(rows, below(apart, 0.5, what="the ratio to random actions"))
 
