@@ -1,8 +1,8 @@
 """Writes docs/reproduction.md: every claim of the paper that a number can test, with ours and a verdict.
 
-    python analysis/claims.py [--runs-dir runs results/runs] [--output docs/reproduction.md]
+    python analysis/claims.py [--runs-dir results/runs] [--output docs/reproduction.md]
 
-Reads the runs and studies that exist, and the paper's tables (analysis/paper_tables). A claim without its runs says
+Reads the archived runs, the studies, and the paper's tables (analysis/paper_tables). A claim without its runs says
 which command makes them. The claims are in analysis/paper_claims, a module a theme; numbers, intervals and verdicts are
 computed, and the same results give the same bytes.
 """
@@ -12,8 +12,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis import protocol
-from analysis.experiments import EXPERIMENTS
+from analysis import experiments, protocol, runs
 from analysis.paper_claims import (
     asymmetry,
     curriculum,
@@ -81,7 +80,7 @@ class Args:
     """Writes the paper's claims with our numbers and verdicts."""
 
     runs_dir: tuple[Path, ...] | None = None
-    """folders that hold the runs, at any depth (None: results/runs and runs)"""
+    """folders that hold the runs, at any depth (None: the archive, results/runs or results/quick/runs)"""
     output: Path | None = None
     """the document (None: docs/reproduction.md, or results/quick/reproduction.md)"""
     quick: bool = False
@@ -148,7 +147,7 @@ def contents(themes: dict[str, dict[int, str]]) -> str:
 def progress(results: Results) -> str:
     """How much of every experiment has been run, as a table, and its studies."""
     lines = ["| experiment | runs | planned | studies | what |", "|---|---|---|---|---|"]
-    for name, what in EXPERIMENTS.items():
+    for name, what in experiments.EXPERIMENTS.items():
         jobs = [job for job in results.jobs if job.experiment == name]
         planned = [job for job in jobs if not job.is_study]
         there = len(planned) - sum(job.experiment == name for job in results.missing)
@@ -169,15 +168,16 @@ def document(results: Results) -> tuple[str, Counter]:
             found = judge(claim, evidence)
             themes[theme.TITLE][number] = found.verdict
             sections.append(section(number, claim, found))
-    runs = "## What has been run\n\n`python analysis/reproduce.py` makes all, and goes on where it stopped.\n\n"
+    last = "## What has been run\n\n`python analysis/reproduce.py` makes all, and goes on where it stopped.\n\n"
     left_out = "".join(f"\nLeft out: {line}\n" for line in results.left_out)
-    text = "\n".join([INTRODUCTION, contents(themes), *sections, runs + progress(results) + "\n"]) + left_out
+    text = "\n".join([INTRODUCTION, contents(themes), *sections, last + progress(results) + "\n"]) + left_out
     return text, Counter(verdict for theme in themes.values() for verdict in theme.values())
 
 
 def main(args: Args) -> None:
     """Write the document; print how many claims have which verdict."""
-    results = Results.load(args.quick, args.runs_dir)
+    archive = experiments.QUICK_ARCHIVE_DIR if args.quick else runs.ARCHIVE_DIR
+    results = Results.load(args.quick, args.runs_dir or (archive,))
     text, counts = document(results)
     path = args.output or Path("results/quick/reproduction.md" if args.quick else "docs/reproduction.md")
     try:

@@ -40,7 +40,7 @@ def asymmetric_is_hardest(evidence):
     rows += [Row(f"gain over zero change, {name.replace('_', ' ')}", "",
                  optional(lambda name=name: seeds(own[name].get("gain_scalarized", pd.Series(dtype=float)))))
              for name in own]  # fmt: skip
-    return finding(rows, all_of(*(above(number, what="either difference") for number in apart.values())))
+    return finding(rows, all_of(*(above(number, what="each difference") for number in apart.values())))
 
 
 @claim("Under the asymmetric reward agents avoid warming; under raw degree-days they accept it (0.1 against 5.0 MJ).",
