@@ -28,8 +28,8 @@ def warming(one) -> dict:
 
 
 @claim("The asymmetric thaw reward is the hardest: contrast and raw degree-days score higher.", "Table 3", THAW,
-       why="Rewards with other formulas have other zeros. Gains over doing nothing under the same reward are what can "
-           "be compared, and only in their own units.")
+       note="Another formula is another scale: where warming weighs less, the same ground scores higher, whatever was "
+            "learnt. Gains over doing nothing, each in the units of its own reward, say more.")
 def asymmetric_is_hardest(evidence):
     table = paper("thaw_formulations", index_col="formulation").scalarized_mean
     own = {name: formulation(evidence, name, run_numbers) for name in table.index}
