@@ -1,4 +1,4 @@
-"""Runs every experiment of the paper (analysis/experiments.py), then archives the runs and makes tables and figures.
+"""Runs every experiment of the paper (analysis/experiments.py), archives the runs, makes tables, figures and claims.
 
     python analysis/reproduce.py                     everything, the main table first; the same command goes on
     python analysis/reproduce.py --only main thaw    some of main fixed site thaw balanced controls variants mechanisms
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Literal
 
 import boreal_env
-from analysis import archive, experiments, make_figures, make_tables, protocol, runs
+from analysis import archive, claims, experiments, make_figures, make_tables, protocol, runs
 from sim.stands import available_cores
 
 Experiment = Literal["main", "fixed", "site", "thaw", "balanced", "controls", "variants", "mechanisms"]
@@ -157,7 +157,7 @@ def finished_configs(*roots: Path) -> list[dict]:
 
 
 def main(args: Args) -> None:
-    """Run what is not finished, archive it, and make tables and figures."""
+    """Run what is not finished, archive it, and make tables, figures and the document of the paper's claims."""
     seeds = None if args.seeds is None else list(args.seeds)
     jobs = experiments.quick_jobs(args.only) if args.quick else experiments.jobs(args.only, seeds)
     if args.list:
@@ -186,6 +186,7 @@ def main(args: Args) -> None:
     archive.archive(runs_dir, archive_dir)
     make_tables.main(make_tables.Args(quick=args.quick))
     make_figures.main(make_figures.Args(quick=args.quick))
+    claims.main(claims.Args(quick=args.quick))
     if failed:
         sys.exit("failed, try the same command again:\n" + "\n".join(f"  {job.command}" for job in failed))
 

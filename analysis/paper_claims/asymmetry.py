@@ -1,0 +1,184 @@
+"""Section 4.2: carbon is easy to learn, thaw is not; and what agents of one weight do."""
+
+import numpy as np
+import pandas as pd
+
+from analysis import metrics
+from analysis.constant_plans import as_evaluation
+from analysis.paper_claims.claim import Missing, Number, Row, about, above, all_of, below, claim, finding, within
+from analysis.paper_claims.evidence import VARIANCE, difference, first_and_last, mean_of, only, seeds
+from analysis.tables.common import GENERALIST
+
+TITLE = "Learning one objective at a time"
+FIXED, SITES = only("main", "fixed"), only("site")
+CARBON, THAW = 1.0, 0.0  # weights
+OBJECTIVE = {CARBON: "carbon_return", THAW: "thaw_return"}
+PART = 0.25  # of what constant plans gain: learnt, if an agent gains more
+
+
+def less_random(evidence, evaluation: pd.DataFrame, objective: str) -> float:
+    """Mean of a return less that of random valid actions on the same episodes."""
+    random = evidence.replicates("main", "random_valid")[0].evaluation
+    if not set(evaluation.seed) <= set(random.seed):
+        raise Missing("random_valid on the same episodes")
+    return metrics.gains(evaluation, random)[objective].mean()
+
+
+def learnt(evidence, weight: float) -> pd.Series:
+    """An agent's own return less that of random valid actions, by training seed."""
+    return pd.Series({run.arguments["seed"]: less_random(evidence, run.evaluation, OBJECTIVE[weight])
+                      for run in evidence.agents("fixed", weight)})  # fmt: skip
+
+
+def attainable(evidence, weight: float) -> float:
+    """What the best constant plan for the weight has over random valid actions."""
+    plans = evidence.study("constant_plans")
+    best = as_evaluation(plans[plans.env_id == GENERALIST], (weight,), best=True)
+    return less_random(evidence, best, OBJECTIVE[weight])
+
+
+def share_learnt(evidence, weight: float) -> pd.Series:
+    """Share of the attainable that an agent of one weight has learnt, by training seed."""
+    return learnt(evidence, weight) / attainable(evidence, weight)
+
+
+def rows_of(evidence, weight: float, papers: str) -> list[Row]:
+    """The lines of an agent of one weight."""
+    name = OBJECTIVE[weight].replace("_", " ")
+    return [Row(f"{name} less that of random actions, same sites", papers, seeds(learnt(evidence, weight))),
+            Row("the same of the best constant plan", "", Number(attainable(evidence, weight))),
+            Row("share of it learnt", papers, seeds(share_learnt(evidence, weight)))]
+
+
+@claim("Agents trained for carbon alone learn fast.", "Section 4.2, figure 2a", FIXED,
+       why="EUPG has no baseline: it weighs every action by the episode's whole return, much of which is the site's.")
+def carbon_is_learnt(evidence):
+    share = seeds(share_learnt(evidence, CARBON))
+    return finding(rows_of(evidence, CARBON, "rises"), above(share, PART, what="the share learnt"))
+
+
+@claim("Agents trained for thaw alone hardly improve.", "Section 4.2, figure 2a", FIXED,
+       why="Planting protects the ground too, and agents of this weight find it.")
+def thaw_is_not_learnt(evidence):
+    share = seeds(share_learnt(evidence, THAW))
+    return finding(rows_of(evidence, THAW, "hardly rises"), below(share, PART, what="the share learnt"))
+
+
+@claim("Learning is asymmetric: of what can be gained, agents learn more in carbon than in thaw.",
+       "Abstract; section 4.2", FIXED)
+def asymmetry(evidence):
+    carbon, thaw = share_learnt(evidence, CARBON), share_learnt(evidence, THAW)
+    apart = difference(carbon, thaw)
+    rows = [Row("share learnt of carbon", "", seeds(carbon)), Row("share learnt of thaw", "", seeds(thaw)),
+            Row("carbon less thaw", "above 0", apart)]
+    return finding(rows, above(apart, what="the difference"))
+
+
+@claim("Single sites show the same: carbon is learnt, thaw is not.", "Section 4.2, figure 2b", SITES,
+       why="On one site nothing of the site's variance stands between an action and its thaw return.")
+def asymmetry_on_single_sites(evidence):
+    def progress(weight):
+        known = {}
+        for run in evidence.agents("site", weight):
+            first, last = first_and_last(run, OBJECTIVE[weight])
+            spread, _ = first_and_last(run, OBJECTIVE[weight], "std")
+            known[run.arguments["site_seed"]] = (last - first) / spread
+        return pd.Series(known).replace([np.inf, -np.inf], np.nan).dropna()
+
+    carbon, thaw = progress(CARBON), progress(THAW)
+    common = carbon.index.intersection(thaw.index)
+    if common.empty:
+        raise Missing("agents of both weights on one site")
+    apart = mean_of(carbon[common] - thaw[common], "sites")
+    unit = "last less first tenth of training, in standard deviations of the first"
+    rows = [Row(f"carbon: {unit}", "rises", mean_of(carbon, "sites")),
+            Row(f"thaw: {unit}", "hardly rises", mean_of(thaw, "sites")), Row("carbon less thaw", "above 0", apart)]
+    return finding(rows, above(apart, what="the difference"))
+
+
+def at_the_end(evidence, weight: float, column: str) -> pd.Series:
+    """Mean of a column of the training episodes in the last tenth, by training seed."""
+    return pd.Series({run.arguments["seed"]: first_and_last(run, column)[1]
+                      for run in evidence.agents("fixed", weight)})  # fmt: skip
+
+
+@claim("Carbon agents raise the density to 1280 stems/ha.", "Section 4.2, figure 2c", FIXED,
+       why="Density after fifty years is a balance of planting and self-thinning, whose strength is a property of the "
+           "simulator; densities of two simulators need not agree.")
+def carbon_density(evidence):
+    density = seeds(at_the_end(evidence, CARBON, "final_density"))
+    return finding([Row("stems/ha at an episode's end, last tenth of training", "1280", density)], about(density, 1280))
+
+
+@claim("Thaw agents stay at 1000 to 1020 stems/ha.", "Section 4.2, figure 2c", FIXED,
+       why="Trees shelter the ground here and thin its snow, so an agent of thaw plants as well.")
+def thaw_density(evidence):
+    density = seeds(at_the_end(evidence, THAW, "final_density"))
+    return finding([Row("stems/ha at an episode's end, last tenth of training", "1000 - 1020", density)],
+                   about(density, 1000, 1020))
+
+
+@claim("Carbon agents end with denser stands than thaw agents.", "Section 4.2, figure 2c", FIXED,
+       why="Both objectives gain by planting; what sets them apart is the species.")
+def carbon_is_denser(evidence):
+    apart = difference(at_the_end(evidence, CARBON, "final_density"), at_the_end(evidence, THAW, "final_density"))
+    return finding([Row("stems/ha, carbon less thaw agents", "260 - 280", apart)], above(apart, papers=260))
+
+
+@claim("Carbon agents leave the conifer fraction as it is.", "Section 4.2, figure 2d", FIXED,
+       why="Deciduous trees use light better and close their canopy sooner, so carbon asks for them.")
+def carbon_keeps_species(evidence):
+    changes = pd.Series({run.arguments["seed"]: np.diff(first_and_last(run, "final_conifer_fraction"))[0]
+                         for run in evidence.agents("fixed", CARBON)})  # fmt: skip
+    change = seeds(changes)
+    return finding([Row("conifer fraction, last less first tenth of training", "about 0", change)],
+                   within(change, -0.05, 0.05))
+
+
+@claim("Thaw agents make stands deciduous.", "Section 4.2, figure 2d", FIXED,
+       why="Conifers build the thicker organic layer here, which insulates more when thawed than when frozen.")
+def thaw_goes_deciduous(evidence):
+    fraction = seeds(at_the_end(evidence, THAW, "final_conifer_fraction"))
+    return finding([Row("conifer fraction at an episode's end, last tenth of training", "below 0.5", fraction)],
+                   below(fraction, 0.5))
+
+
+@claim("Mixed weights lead to the highest conifer fractions.", "Figure 2d", FIXED,
+       why="The species that either objective asks for is found at the ends; between them both pull.")
+def mixed_weights_have_most_conifers(evidence):
+    ends = {weight: at_the_end(evidence, weight, "final_conifer_fraction") for weight in (THAW, CARBON)}
+    inner = [at_the_end(evidence, weight, "final_conifer_fraction") for weight in (0.25, 0.5, 0.75)]
+    apart = difference(pd.concat(inner, axis=1).mean(axis=1), pd.concat(ends, axis=1).max(axis=1))
+    rows = [Row("conifer fraction of carbon agents", "", seeds(ends[CARBON])),
+            Row("of thaw agents", "", seeds(ends[THAW])),
+            Row("mean of the mixed weights less the higher of these", "above 0", apart)]
+    return finding(rows, above(apart, what="the difference"))
+
+
+def share(evidence, objective: str, component: str) -> Number:
+    """Share of a component in the variance of 50-year returns, with its interval over resampled sites."""
+    table = evidence.beside("variance/components.csv")
+    row = table[(table.value == "return") & (table.objective == objective)].set_index("component").loc[component]
+    return Number(row.share, row.share_low, row.share_high, "resampled sites")
+
+
+@claim("The site decides about thaw, whatever the management.", "Appendix, site influence; section 4.3", VARIANCE,
+       note="It describes how sites are sampled: boundary and climate are drawn independently of each other.")
+def site_decides_thaw(evidence):
+    site = share(evidence, "thaw", "site")
+    rows = [Row("share of the site in the variance of thaw returns", "major", site),
+            Row("share of the policy", "", share(evidence, "thaw", "policy"))]
+    return finding(rows, above(site, 0.5, what="the site's share"))
+
+
+@claim("Carbon gives clear feedback on actions, thaw a noisy one.", "Sections 4.2 and 5", VARIANCE)
+def carbon_feedback_is_clear(evidence):
+    carbon, thaw = share(evidence, "carbon", "policy"), share(evidence, "thaw", "policy")
+    rows = [Row("share of the policy in the variance of carbon returns", "high", carbon),
+            Row("share of the policy in the variance of thaw returns", "low", thaw)]
+    return finding(rows, all_of(above(carbon, 0.1, what="carbon's share"), below(thaw, 0.1, what="thaw's share")))
+
+
+CLAIMS = (carbon_is_learnt, thaw_is_not_learnt, asymmetry, asymmetry_on_single_sites, carbon_density, thaw_density,
+          carbon_is_denser, carbon_keeps_species, thaw_goes_deciduous, mixed_weights_have_most_conifers,
+          site_decides_thaw, carbon_feedback_is_clear)  # fmt: skip

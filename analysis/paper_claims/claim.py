@@ -1,0 +1,172 @@
+"""A claim of the paper, a number of ours with its interval, and the rules by which numbers become verdicts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+REPRODUCED, NOT_REPRODUCED = "reproduced", "not reproduced"
+CONTRADICTS = "the paper contradicts itself"
+UNTESTABLE = "cannot be tested here"
+UNDECIDED, NO_RUNS = "undecided", "no runs yet"
+VERDICTS = (REPRODUCED, NOT_REPRODUCED, CONTRADICTS, UNTESTABLE, UNDECIDED, NO_RUNS)
+
+SEEDS = "training seeds"
+FEWEST_SEEDS = 3  # for a verdict
+ABOUT = 0.1  # a value of the paper is met within this share of it
+
+
+class Missing(Exception):
+    """What a claim needs is not there; the text says what."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number with its 95 % interval (NaN without one).
+
+    over : what the interval is over, "" for an exact number; count : how many of them, 0 if that says nothing.
+    """
+
+    value: float
+    low: float = np.nan
+    high: float = np.nan
+    over: str = ""
+    count: int = 0
+
+    @property
+    def decides(self) -> bool:
+        """Whether a verdict may rest on it."""
+        if np.isnan(self.value):
+            return False
+        return not self.over or (not np.isnan(self.low) and (self.over != SEEDS or self.count >= FEWEST_SEEDS))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Its interval; an exact number is its own."""
+        return (self.low, self.high) if self.over else (self.value, self.value)
+
+    def __str__(self) -> str:
+        text = short(self.value)
+        return text if np.isnan(self.low) else f"{text} [{short(self.low)}, {short(self.high)}]"
+
+    @property
+    def basis(self) -> str:
+        """What it is over, as text."""
+        one = self.count == 1
+        return f"{self.count} {self.over.removesuffix('s') if one else self.over}" if self.count else self.over
+
+
+def short(value: float) -> str:
+    """Three digits, without an exponent, with a true minus."""
+    if np.isnan(value):
+        return "?"
+    text = f"{value:,.0f}" if abs(value) >= 999.5 else f"{value:.3g}" if abs(value) >= 1e-4 or value == 0 else "0"
+    return text.replace("-", "−")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of a claim's table: a quantity, the paper's value as text, and ours."""
+
+    what: str
+    paper: str
+    ours: Number | str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Whether a claim holds (None: the numbers do not decide), and the rule as text: "reproduced if .."."""
+
+    holds: bool | None
+    rule: str
+    waits: bool = False  # for more training seeds
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What our results say of a claim."""
+
+    rows: list[Row]
+    verdict: str
+    rule: str = ""
+    waits: bool = False
+
+
+def finding(rows: list[Row], answer: Answer, otherwise: str = NOT_REPRODUCED) -> Finding:
+    """The finding of an answer; `otherwise` is the verdict on a claim that does not hold."""
+    verdict = UNDECIDED if answer.holds is None else REPRODUCED if answer.holds else otherwise
+    return Finding(rows, verdict, answer.rule, answer.waits)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper; `measure` turns the evidence into a finding, or raises Missing.
+
+    why : the mechanism, printed if the claim is not reproduced; note : printed always. Neither has a number in it:
+    numbers are in the rows. command : what makes the runs, "" if the paper's tables are enough.
+    """
+
+    statement: str
+    where: str
+    command: str
+    measure: Callable
+    why: str = ""
+    note: str = ""
+
+
+def claim(statement: str, where: str, command: str = "", why: str = "", note: str = "") -> Callable:
+    """Makes a claim of the function below it."""
+    return lambda measure: Claim(statement, where, command, measure, why, note)
+
+
+# ------------------------------------------------------------------------------------------------ rules
+
+
+def above(number: Number, limit: float = 0.0, papers: float | None = None, what: str = "the interval") -> Answer:
+    """Holds if the interval lies above the limit; not if below, or if it has the limit but not the paper's value."""
+    low, high = number.ends
+    rule = f"{what} lies above {short(limit)}"
+    if not number.decides:
+        return Answer(None, rule, waits=True)
+    fails = high <= limit or (papers is not None and low <= limit and high < papers)
+    return Answer(True if low > limit else False if fails else None, rule)
+
+
+def below(number: Number, limit: float = 0.0, papers: float | None = None, what: str = "the interval") -> Answer:
+    """Holds if the interval lies below the limit; not if above, or if it has the limit but not the paper's value."""
+    mirrored = Number(-number.value, -number.high, -number.low, number.over, number.count)
+    answer = above(mirrored, -limit, None if papers is None else -papers)
+    return Answer(answer.holds, f"{what} lies below {short(limit)}", answer.waits)
+
+
+def within(number: Number, low: float, high: float, what: str = "the value") -> Answer:
+    """Holds if the value lies in a range; not if the whole interval lies outside."""
+    rule = f"{what} lies between {short(low)} and {short(high)}"
+    if not number.decides:
+        return Answer(None, rule, waits=True)
+    outside = number.ends[1] < low or number.ends[0] > high
+    return Answer(True if low <= number.value <= high else False if outside else None, rule)
+
+
+def equals(value: float, wanted: float, what: str) -> Answer:
+    """Holds if a count is the wanted one."""
+    return Answer(bool(value == wanted), f"{what} is {short(wanted)}")
+
+
+def about(number: Number, low: float, high: float | None = None, what: str = "the value") -> Answer:
+    """Holds if the value is the paper's, or in the paper's range, give or take a tenth."""
+    high = low if high is None else high
+    return within(number, low - ABOUT * abs(low), high + ABOUT * abs(high), what)
+
+
+def opposite(answer: Answer) -> Answer:
+    """Holds if the answer does not."""
+    return Answer(None if answer.holds is None else not answer.holds, f"this fails: {answer.rule}", answer.waits)
+
+
+def all_of(*answers: Answer) -> Answer:
+    """Holds if all do, not if one does not."""
+    holds = [answer.holds for answer in answers]
+    rule = " and ".join(dict.fromkeys(answer.rule for answer in answers))
+    decided = False if False in holds else None if None in holds else True
+    return Answer(decided, rule, decided is None and any(answer.waits for answer in answers))

@@ -1,0 +1,144 @@
+"""Section 4.3 and the appendix on the curriculum: is it the selection that helps, and what is selected."""
+
+import numpy as np
+import pandas as pd
+
+from analysis.paper_claims.claim import Missing, Number, Row, above, all_of, below, claim, finding, short
+from analysis.paper_claims.evidence import SEEDS, difference, only, optional, seeds
+from analysis.paper_claims.performance import CURRICULUM, GATED, published, scalarised
+from analysis.tables import curriculum_selection
+
+TITLE = "What of the curriculum it is that helps"
+CONTROLS, MAIN, SELECTION = only("main", "controls"), only("main"), only("main", "mechanisms")
+PAPERS = published(CURRICULUM).scalarized_mean - published(GATED).scalarized_mean
+NO_DIFFERENCE = "An episode that is not trained on costs as much simulation as one that is, and teaches nothing."
+
+
+def control(evidence, script: str, **flags) -> pd.Series:
+    """Scalarised return of a control, by training seed."""
+    return evidence.metric("scalarized", "controls", script, **flags)
+
+
+def compared(name: str, first: pd.Series, other: str, second: pd.Series):
+    """The finding on a difference of two rows."""
+    apart = difference(first, second)
+    rows = [Row(f"scalarised, {name}", "", seeds(first)), Row(f"scalarised, {other}", "", seeds(second)),
+            Row("difference, paired by seed", f"{short(PAPERS)} for selecting", apart)]
+    return finding(rows, above(apart, papers=PAPERS, what="the difference"))
+
+
+@claim("Even a random selection of sites brings significant benefits: at the same number of years trained on.",
+       "Curriculum mechanism (our control)", CONTROLS,
+       why="Years of selected sites are worth no more than years of any sites.",
+       note="The curriculum trains on about half of its episodes: without selection the agent has half the budget. "
+            "At the same budget of simulation the two are compared above.")
+def same_training(evidence):
+    return compared("Curriculum", scalarised(evidence, CURRICULUM), "no selection, half the budget",
+                    control(evidence, GATED, budget=0.5))
+
+
+@claim("It is the site that the selection has to go by: a coin would not do.", "Section 4.4 (our control)",
+       CONTROLS,
+       why="A random network of the site is a coin too, tossed once for each site, and sites do not come back.",
+       note="The control selects every episode by a coin, with the same threshold.")
+def coin(evidence):
+    return compared("Curriculum", scalarised(evidence, CURRICULUM), "selection by a coin",
+                    control(evidence, CURRICULUM, selector="coin"))
+
+
+@claim("A fixed, randomly initialised network is enough to select sites.", "Curriculum mechanism", CONTROLS,
+       why="A raw random network puts nearly all sites on one side of the threshold, which side depends on its seed.",
+       note="The paper's wording taken literally; ours centres and scales the network's output over sampled sites.")
+def raw_network(evidence):
+    raw = evidence.by_seed(share_selected, "controls", CURRICULUM, raw_selector=True)["share"]
+    centred = evidence.by_seed(share_selected, "main", CURRICULUM)["share"]
+    splits = seeds(((raw > 0.1) & (raw < 0.9)).astype(float))
+    rows = [Row("episodes selected %, lowest of the raw networks", "", Number(100 * raw.min())),
+            Row("episodes selected %, highest of the raw networks", "", Number(100 * raw.max())),
+            Row("share of raw networks that select a tenth to nine tenths", "all", splits),
+            Row("episodes selected %, centred and scaled", "", seeds(100 * centred)),
+            Row("scalarised, raw less centred", "", optional(lambda: difference(
+                control(evidence, CURRICULUM, raw_selector=True), scalarised(evidence, CURRICULUM))))]  # fmt: skip
+    return finding(rows, above(splits, 0.5, what="the share that splits the sites"))
+
+
+def share_selected(one) -> dict:
+    """Share of a run's training episodes that were trained on."""
+    return {"share": one.runs[0].episodes.selected.mean()}
+
+
+@claim("More data would not help as selection does.", "Section 4.3 (our control)", CONTROLS,
+       why="The curriculum is compared here with the same agent, without selection and with twice the budget.")
+def more_data(evidence):
+    return compared("Curriculum", scalarised(evidence, CURRICULUM), "no selection, twice the budget",
+                    control(evidence, GATED, budget=2.0))
+
+
+@claim("The curriculum's lead holds with twice the budget for both.", "Section 4.3 (our control)", CONTROLS,
+       why=NO_DIFFERENCE)
+def twice_the_budget(evidence):
+    return compared("Curriculum, twice the budget", control(evidence, CURRICULUM, budget=2.0),
+                    "no selection, twice the budget", control(evidence, GATED, budget=2.0))
+
+
+def selection(evidence, column: str) -> dict[str, Number]:
+    """A column of the table of selected sites: accepted, rejected and their difference within a run."""
+    runs = evidence.study("site_warming").seed.nunique()
+    evidence.replicates("main", CURRICULUM)
+    table = curriculum_selection.make(evidence.results).set_index("category")
+    if column not in table:
+        raise Missing(f"{column} of selected sites")
+    return {name: Number(row[column], row[f"{column}_low"], row[f"{column}_high"], SEEDS, runs)
+            for name, row in table.iterrows()}  # fmt: skip
+
+
+@claim("Accepted sites lie north, rejected ones south of 60° N.", "Table of curriculum selection", SELECTION,
+       why="A network with random weights knows nothing of latitude; which way it leans is its seed's, and over seeds "
+           "accepted and rejected sites are alike.")
+def accepted_lie_north(evidence):
+    latitude = selection(evidence, "latitude")
+    rows = [Row("latitude of accepted sites", "above 60", latitude["accepted"]),
+            Row("latitude of rejected sites", "below 60", latitude["rejected"]),
+            Row("accepted less rejected", "above 0", latitude["accepted less rejected"])]
+    accepted = above(latitude["accepted"], 60, what="accepted")
+    return finding(rows, all_of(accepted, below(latitude["rejected"], 60, what="rejected")))
+
+
+@claim("Accepted sites would hardly warm, rejected ones strongly.", "Table of curriculum selection", SELECTION,
+       why="The selector sees parameters, not heat; its weights are random and never trained.")
+def accepted_are_safe(evidence):
+    warming, thaw = selection(evidence, "warming"), selection(evidence, "thaw")
+    apart = warming["accepted less rejected"]
+    rows = [Row("warming of accepted sites, left alone [MJ/m2/yr]", "about 0.5", warming["accepted"]),
+            Row("warming of rejected sites", "about 8.0", warming["rejected"]),
+            Row("accepted less rejected", "−7.5", apart),
+            Row("thaw return of zero change, accepted less rejected", "", thaw["accepted less rejected"])]
+    return finding(rows, below(apart, papers=-7.5, what="the difference"))
+
+
+@claim("The threshold breathes: training expands and contracts with the agent's competence.", "Curriculum mechanism",
+       MAIN,
+       why="A thousandth a rollout is little: the threshold cannot move far within the budget.")
+def threshold_breathes(evidence):
+    table = evidence.by_seed(breathing, "main", CURRICULUM)
+    change = seeds(table["range"])
+    rows = [Row("share of episodes selected, most less least tenth of training, in points", "", change),
+            Row("lowest threshold", "", seeds(table.lowest)), Row("highest threshold", "", seeds(table.highest)),
+            Row("moves up, of all moves %", "both ways", seeds(table.up))]
+    both = all_of(above(seeds(table.up), 5.0, what="moves up"), below(seeds(table.up), 95.0, what="moves up"))
+    return finding(rows, all_of(above(change, 10.0, what="the range of the share selected"), both))
+
+
+def breathing(one) -> dict:
+    """How the threshold of a run moved, and with it the share of episodes that were trained on."""
+    episodes = one.runs[0].episodes
+    moves = np.diff(episodes.threshold)
+    moves = moves[moves != 0]
+    parts = np.array_split(episodes.selected.to_numpy(), 10)
+    shares = 100 * np.array([part.mean() for part in parts if len(part)])
+    return {"lowest": episodes.threshold.min(), "highest": episodes.threshold.max(), "range": np.ptp(shares),
+            "up": 100 * (moves > 0).mean() if len(moves) else 0.0}  # fmt: skip
+
+
+CLAIMS = (same_training, coin, raw_network, more_data, twice_the_budget, accepted_lie_north,
+          accepted_are_safe, threshold_breathes)  # fmt: skip

@@ -1,0 +1,193 @@
+"""Section 4.4 and the appendix on demographics: what the methods do with a stand."""
+
+import pandas as pd
+
+from analysis import metrics
+from analysis.figures.common import by_year
+from analysis.paper_claims.claim import (
+    UNTESTABLE,
+    Finding,
+    Missing,
+    Number,
+    Row,
+    about,
+    above,
+    all_of,
+    below,
+    claim,
+    finding,
+    short,
+)
+from analysis.paper_claims.evidence import difference, first_and_last, only, optional, seeds
+from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED
+from analysis.paper_claims.preference import change
+from analysis.results import TITLES
+from analysis.tables.common import paper
+from analysis.tables.learned_strategies import numbers
+
+TITLE = "What the methods do with a stand"
+MAIN = only("main")
+# conifer fractions at evaluation, appendix on demographics
+FRACTIONS = {GATED: (0.75, 0.95), CURRICULUM: (0.6, 0.65), EUPG: (0.35, 0.65)}
+OLDER = ["deciduous_mature_stems_ha", "deciduous_old_stems_ha"]
+
+
+def strategy(evidence, script: str, name: str) -> pd.Series:
+    """A number of the table of strategies, by training seed."""
+    values = evidence.by_seed(numbers, "main", script)[name].astype(float).dropna()
+    if values.empty:
+        raise Missing(f"an annual record of {script}")
+    return values
+
+
+@claim("PPO Gated ends with the highest conifer fraction (0.75 to 0.95), Curriculum PPO with 0.6 to 0.65, EUPG with "
+       "0.35 to 0.65.", "Section 4.4, figure 4a; appendix, demographics", MAIN)
+def conifer_fractions(evidence):
+    ours = {script: seeds(strategy(evidence, script, "final_conifer_fraction")) for script in FRACTIONS}
+    rows = [Row(f"conifer fraction in the last year, {TITLES[script]}", f"{low} - {high}", ours[script])
+            for script, (low, high) in FRACTIONS.items()]
+    answers = (about(ours[script], *FRACTIONS[script], what=TITLES[script]) for script in FRACTIONS)
+    return finding(rows, all_of(*answers))
+
+
+def ordered(evidence, name: str, first: str, second: str, what: str, papers: str = "above 0"):
+    """The finding on one method having more of something than another."""
+    values = {script: strategy(evidence, script, name) for script in (first, second)}
+    apart = difference(values[first], values[second])
+    rows = [Row(f"{what}, {TITLES[script]}", "", seeds(values[script])) for script in values]
+    rows.append(Row("difference", papers, apart))
+    return finding(rows, above(apart, what="the difference"))
+
+
+@claim("PPO Gated has more conifers than Curriculum PPO.", "Section 4.4, figure 4a", MAIN,
+       why="Both are the same agent; they differ in which half of the episodes they are trained on.")
+def gated_has_more_conifers(evidence):
+    what = "conifer fraction in the last year"
+    return ordered(evidence, "final_conifer_fraction", GATED, CURRICULUM, what, "0.1 - 0.35")
+
+
+@claim("PPO Gated keeps denser stands than Curriculum PPO.", "Section 4.4, figure 4b, c", MAIN,
+       why="Both are the same agent; they differ in which half of the episodes they are trained on.")
+def gated_is_denser(evidence):
+    return ordered(evidence, "density", GATED, CURRICULUM, "stems/ha, mean over the years")
+
+
+@claim("Curriculum PPO keeps denser stands than Variable λ EUPG.", "Section 4.4, figure 4b, c", MAIN)
+def curriculum_is_denser(evidence):
+    return ordered(evidence, "density", CURRICULUM, EUPG, "stems/ha, mean over the years")
+
+
+@claim("Variable λ EUPG falls into inaction: minimal changes.", "Section 4.4; table of learned strategies", MAIN,
+       why="Without an entropy bonus it settles on few actions, and on planting ones.",
+       note="The appendix says of the same agent that it \"exhibits sustained density growth\".")
+def eupg_does_little(evidence):
+    done = {script: strategy(evidence, script, "planted") + strategy(evidence, script, "thinned")
+            for script in (EUPG, GATED, "random_valid")}  # fmt: skip
+    apart = seeds(done[EUPG] / done["random_valid"].iloc[0])
+    rows = [Row(f"planted and thinned [stems/ha/yr], {TITLES[script]}", "minimal" if script == EUPG else "",
+                seeds(done[script])) for script in (EUPG, GATED)]
+    rows.append(Row("of random valid actions", "", Number(done["random_valid"].iloc[0])))
+    rows.append(Row("EUPG over random valid actions", "below 1", apart))
+    return finding(rows, below(apart, 0.5, what="the ratio to random actions"))
+
+
+@claim("PPO Gated plants early and fast; stands thin naturally later.", "Section 4.4, figure 4b", MAIN,
+       why="The masks allow planting as long as there is room, and mortality makes room every year.")
+def early_growth(evidence):
+    curves = by_year(evidence.replicates("main", GATED), "density_stems_ha")
+    decline = seeds(pd.Series(100 * (1 - curves[:, -1] / curves.max(axis=1))))
+    peak = seeds(pd.Series(1.0 + curves.argmax(axis=1)))
+    rows = [Row("year of highest density", "early", peak),
+            Row("decline from there to the last year, %", "above 0", decline)]
+    return finding(rows, above(decline, 1.0, what="the decline"))
+
+
+def mean_gains(one) -> dict:
+    """Mean gains of a replicate over zero change; empty if that was not evaluated."""
+    return {} if one.gains is None else one.gains[metrics.OBJECTIVES].mean().to_dict()
+
+
+def gain(evidence, script: str, objective: str) -> pd.Series:
+    """Mean gain in an objective by training seed."""
+    table = evidence.by_seed(mean_gains, "main", script)
+    if objective not in table:
+        raise Missing("zero_change on the same episodes")
+    return table[objective]
+
+
+@claim("PPO Gated farms carbon and fails to protect permafrost.", "Section 4.4; table of learned strategies", MAIN,
+       why="Planting gains in both objectives here.")
+def gated_fails_permafrost(evidence):
+    carbon, thaw = (seeds(gain(evidence, GATED, f"{name}_return")) for name in ("carbon", "thaw"))
+    rows = [Row("carbon gain over zero change", "above 0", carbon), Row("thaw gain over zero change", "below 0", thaw)]
+    return finding(rows, all_of(above(carbon, what="carbon's gain"), below(thaw, what="thaw's gain")))
+
+
+@claim("Curriculum PPO protects permafrost better than PPO Gated.", "Section 4.4; table of detailed objectives", MAIN,
+       why="Trained on other episodes, the same agent finds the same kind of policy.")
+def curriculum_protects(evidence):
+    table = paper("detailed_objectives").groupby("method").thaw_mean.mean()
+    papers = table["curriculum_ppo"] - table["ppo_gated"]
+    apart = difference(gain(evidence, CURRICULUM, "thaw_return"), gain(evidence, GATED, "thaw_return"))
+    rows = [Row(f"thaw gain, {TITLES[script]}", "", seeds(gain(evidence, script, "thaw_return")))
+            for script in (CURRICULUM, GATED)]
+    rows.append(Row("Curriculum less Gated", short(papers), apart))
+    return finding(rows, above(apart, papers=papers, what="the difference"))
+
+
+def older_deciduous(one) -> dict:
+    """Mature and old deciduous stems in the last year, mean over the kept weights."""
+    years = one.years(OLDER)
+    last = years[years.year == years.year.max()]
+    return {"stems": last.groupby("variable")["mean"].mean().sum()}
+
+
+@claim("Variable λ EUPG keeps most mature and old deciduous trees.", "Appendix, demographics", MAIN)
+def eupg_keeps_old_trees(evidence):
+    stems = {script: evidence.by_seed(older_deciduous, "main", script)["stems"] for script in FRACTIONS}
+    apart = [difference(stems[EUPG], stems[other]) for other in (GATED, CURRICULUM)]
+    rows = [Row(f"mature and old deciduous stems/ha, last year, {TITLES[script]}", "", seeds(stems[script]))
+            for script in stems]
+    rows += [Row(f"EUPG less {TITLES[other]}", "above 0", number)
+             for other, number in zip((GATED, CURRICULUM), apart, strict=True)]
+    return finding(rows, all_of(*(above(number, what="each difference") for number in apart)))
+
+
+@claim("PPO Gated's density generalises from training to evaluation, Variable λ EUPG's does not.",
+       "Appendix, training dynamics", MAIN,
+       why="Training draws new sites in every episode, from the evaluation's distribution: there is nothing to overfit "
+           "to.")
+def density_generalises(evidence):
+    shift = {}
+    for script in (GATED, EUPG):
+        late = evidence.by_seed(late_density, "main", script)["late"]
+        shift[script] = 100 * (strategy(evidence, script, "final_density") / late - 1).abs()
+    apart = difference(shift[EUPG], shift[GATED])
+    rows = [Row(f"density at evaluation against late training, difference in %, {TITLES[script]}",
+                "small" if script == GATED else "large", seeds(shift[script])) for script in shift]
+    rows.append(Row("EUPG less PPO Gated", "above 0", apart))
+    small = below(seeds(shift[GATED]), 10, what="PPO Gated's own")
+    return finding(rows, all_of(above(apart, what="the difference"), small))
+
+
+def late_density(one) -> dict:
+    """Mean density at an episode's end in the last tenth of a run's training [stems ha-1]."""
+    return {"late": first_and_last(one.runs[0], "final_density")[1]}
+
+
+@claim("Carbon's gradient overpowers thaw's in PPO Gated.", "Section 4.4; table of learned strategies", MAIN,
+       note="The runs log losses, not the gradient of each objective; with the norms of both in every update it could "
+            "be tested. What can be seen is what becomes of the policy if advantages are normalised for each objective "
+            "apart.")
+def gradient_dominance(evidence):
+    apart = {"ent_coef": 0.0, "per_objective_advantages": True}
+    rows = [Row(f"{name}, weight 1 less weight 0, {what}", "",
+                optional(lambda n=name, e=experiment, f=flags: seeds(change(evidence, n, e, GATED, **f))))
+            for name in ("carbon", "thaw")
+            for what, experiment, flags in (("PPO Gated", "main", {}), ("per-objective advantages", "variants", apart))]
+    return Finding(rows, UNTESTABLE)
+
+
+CLAIMS = (conifer_fractions, gated_has_more_conifers, gated_is_denser, curriculum_is_denser, eupg_does_little,
+          early_growth, gated_fails_permafrost, curriculum_protects, eupg_keeps_old_trees,
+          density_generalises, gradient_dominance)  # fmt: skip

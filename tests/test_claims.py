@@ -1,0 +1,326 @@
+import re
+import shutil
+from itertools import permutations
+
+import numpy as np
+import pandas as pd
+import pytest
+from tiny_runs import TINY_RUNS, write_run
+
+from analysis import claims, experiments, stored
+from analysis.constant_plans import PLANTING
+from analysis.mechanism_pairs import MEANS, PAIRS
+from analysis.paper_claims import asymmetry, curriculum, environment, paper_itself, performance, preference, speed
+from analysis.paper_claims.claim import (
+    CONTRADICTS,
+    NO_RUNS,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    SEEDS,
+    UNDECIDED,
+    UNTESTABLE,
+    Number,
+    about,
+    above,
+    all_of,
+    below,
+    opposite,
+    short,
+    within,
+)
+from analysis.paper_claims.evidence import Evidence
+from analysis.results import Results
+
+GENERALIST = "boreal-generalist-v0"
+
+
+def results_of(runs, studies=None, jobs=None):
+    return Results((runs,), jobs or experiments.jobs(), studies or runs / "no studies")
+
+
+def found(claim, runs, studies=None):
+    """The finding, and what it says of each quantity."""
+    finding = claims.judge(claim, Evidence(results_of(runs, studies)))
+    return finding, {row.what: row.ours for row in finding.rows}
+
+
+# ------------------------------------------------------------------------------------------- rules
+
+def seeds(value, low, high, count=5):
+    return Number(value, low, high, SEEDS, count)
+
+
+@pytest.mark.parametrize(("number", "papers", "holds"), [
+    (seeds(1, 0.5, 2), None, True), (seeds(-1, -2, -0.5), None, False), (seeds(0.2, -1, 1), None, None),
+    (seeds(0.2, -1, 1), 3.8, False), (seeds(0.2, -1, 5), 3.8, None), (seeds(1, 0.5, 2, count=2), 3.8, None),
+    (Number(1, over=SEEDS, count=1), None, None), (Number(1), None, True), (Number(np.nan), None, None),
+])
+def test_signs(number, papers, holds):
+    assert above(number, papers=papers).holds is holds
+    mirrored = Number(-number.value, -number.high, -number.low, number.over, number.count)
+    assert below(mirrored, papers=None if papers is None else -papers).holds is holds
+
+
+def test_ranges_and_several_parts():
+    assert within(seeds(5, 4, 6), 4.5, 5.5).holds is True
+    assert within(seeds(5, 4, 6), 5.5, 7).holds is None
+    assert within(seeds(5, 4, 6), 7, 8).holds is False
+    assert about(seeds(9, 8, 10), 8.5).holds is True and about(Number(9.4), 8.5).holds is False
+    assert about(Number(-2.7), -2.5).holds is True
+    yes, no, open_ = (above(Number(value), limit) for value, limit in ((1, 0), (-1, 0), (np.nan, 0)))
+    assert [all_of(yes, one).holds for one in (yes, open_, no)] == [True, None, False]
+    assert all_of(open_, no).holds is False
+    assert [opposite(one).holds for one in (yes, no, open_)] == [False, True, None]
+    assert all_of(yes, above(seeds(1, 0.5, 2, count=2))).waits and not all_of(yes, above(seeds(0, -1, 1))).waits
+
+
+def test_numbers_as_text():
+    assert [short(x) for x in (-0.123456, 1280.4, 3.8, 0, np.nan)] == ["−0.123", "1,280", "3.8", "0", "?"]
+    assert str(seeds(1, -0.5, 2)) == "1 [−0.5, 2]" and seeds(1, 0, 2).basis == "5 training seeds"
+    assert str(Number(1, over=SEEDS, count=1)) == "1" and Number(1, over=SEEDS, count=1).basis == "1 training seed"
+
+
+# ------------------------------------------------------------------------------- the paper by itself
+
+@pytest.mark.parametrize("points", [2, 3, 4])
+def test_chance_of_keeping_monotonicity(points):
+    orders = [np.diff(order) > 0 for order in permutations(range(points))]
+    kept = [(a & b).sum() for a in orders for b in orders]
+    counted = np.bincount(kept, minlength=points) / len(kept)
+    assert paper_itself.chance_of_kept(points) == pytest.approx(counted)
+    assert paper_itself.chance_of_kept(points) @ np.arange(points) == pytest.approx((points - 1) / 4)
+
+
+def test_at_most_half_violated_by_chance():
+    # two pairs: the chance that one or both are kept is 1 less that none is
+    assert paper_itself.chance_of_at_most(50, 2) == pytest.approx(1 - paper_itself.chance_of_kept(3)[0])
+    assert paper_itself.chance_of_at_most(100, 5) == pytest.approx(1)
+
+
+def test_the_papers_tables(tmp_path):
+    verdicts = {claim: found(claim, tmp_path)[0].verdict for claim in paper_itself.CLAIMS}
+    contradict = {claim for claim, verdict in verdicts.items() if verdict == CONTRADICTS}
+    assert contradict == {paper_itself.hypervolumes, paper_itself.sparsities, paper_itself.spreads,
+                          paper_itself.heuristic_hypervolumes, paper_itself.strategies, paper_itself.gated_warming}
+    assert verdicts[paper_itself.scalarised] == verdicts[paper_itself.violations] == REPRODUCED
+    assert found(paper_itself.hypervolumes, tmp_path)[1]["hypervolume, Curriculum PPO"] == "120 from its details"
+    heuristics = found(paper_itself.heuristic_hypervolumes, tmp_path)[1]
+    assert heuristics["hypervolume, zero change (scalarised −2.5)"] == "at most 0 as one point"
+    assert heuristics["hypervolume, target density (scalarised 4.3)"] == "at most 39.7 as one point"  # 6.3 squared
+    # weights 0 and 1 have the spread of thaw and of carbon alone; the means are 7.8 .. 10
+    assert "at most 1.65" in found(paper_itself.spreads, tmp_path)[1]["standard deviation, Curriculum PPO"]
+
+
+def test_actions_and_parameters(tmp_path):
+    finding, ours = found(environment.unique_actions, tmp_path)
+    assert finding.verdict == CONTRADICTS and ours["actions that can differ in effect"].value == 25 - 4
+    assert found(environment.listed_parameters, tmp_path)[1]["of them with a range in the paper"].value == 34
+    assert found(environment.steps_of_a_year, tmp_path)[0].verdict == REPRODUCED
+
+
+# ------------------------------------------------------------------------------------- runs, by hand
+
+def test_one_seed_is_no_verdict():
+    finding, ours = found(performance.CLAIMS[0], TINY_RUNS)
+    assert finding.verdict == UNDECIDED
+    assert ours["scalarised return"].value == pytest.approx(5 / 3) and ours["scalarised return"].count == 1
+    assert ours["the same less zero change, same episodes"].value == pytest.approx(5 / 3)  # (1 + 1 + 3) / 3
+    assert ours["share of the site in the variance of thaw returns (`analysis/variance.py`)"] == "no runs yet"
+    finding, ours = found(preference.curriculum_follows, TINY_RUNS)
+    assert [ours[f"{name} return, weight 1 less weight 0"].value for name in ("carbon", "thaw")] == [2, -2]
+
+
+@pytest.fixture
+def three_seeds(tmp_path):
+    """Three seeds of the curriculum, at 8.5 to 8.7 for every weight, and of gated PPO, at 4.7."""
+    for seed in (1, 2, 3):
+        better = (8.4 + seed / 10,) * 3
+        write_run(tmp_path / f"c{seed}", "ppo_curriculum", seed, better, better, vectorization="lockstep")
+        write_run(tmp_path / f"g{seed}", "ppo_gated", seed, (4.7,) * 3, (4.7,) * 3, vectorization="lockstep")
+    return tmp_path
+
+
+def test_three_seeds_are(three_seeds):
+    finding, ours = found(performance.CLAIMS[0], three_seeds)
+    assert finding.verdict == REPRODUCED
+    assert ours["scalarised return"].value == pytest.approx(8.6) and ours["scalarised return"].low < 8.6
+    finding, ours = found(performance.curriculum_beats_gated, three_seeds)
+    assert finding.verdict == REPRODUCED
+    assert ours["scalarised, Curriculum less Gated"].value == pytest.approx(3.9)
+    assert found(performance.gated_beats_eupg, three_seeds)[0].verdict == NO_RUNS
+    # the same at every weight: it does not follow the preference
+    assert found(preference.gated_does_not_follow, three_seeds)[0].verdict == REPRODUCED
+    assert found(preference.curriculum_follows, three_seeds)[0].verdict == NOT_REPRODUCED
+
+
+def test_no_difference_is_not_reproduced(tmp_path):
+    for seed in (1, 2, 3):
+        for script in ("ppo_curriculum", "ppo_gated"):
+            write_run(tmp_path / f"{script}{seed}", script, seed, (1, 2, 4), (3, 2, 1), vectorization="lockstep")
+    finding, ours = found(performance.curriculum_beats_gated, tmp_path)
+    assert ours["scalarised, Curriculum less Gated"].ends == (0, 0) and finding.verdict == NOT_REPRODUCED
+    assert found(preference.curriculum_follows, tmp_path)[0].verdict == REPRODUCED
+    assert found(preference.gated_does_not_follow, tmp_path)[0].verdict == NOT_REPRODUCED
+    finding, ours = found(preference.gated_always_violates, tmp_path)
+    assert ours["violations %"].value == 0 and finding.verdict == NOT_REPRODUCED
+
+
+def test_heuristics_are_paired_over_episodes(tmp_path):
+    write_run(tmp_path / "zero", "zero_change", carbon=(0,) * 3, thaw=(0,) * 3)
+    write_run(tmp_path / "plus", "plus_100", carbon=(1,) * 3, thaw=(2,) * 3)
+    finding, ours = found(performance.planting_is_worst, tmp_path)
+    # gains 1 and 2 on both episodes: 1.5 over symmetric weights
+    assert ours["scalarised, +100 a year less zero change"].ends == (1.5, 1.5)
+    assert finding.verdict == NOT_REPRODUCED
+
+
+def test_what_is_learnt_is_measured_from_random_actions(tmp_path):
+    studies = tmp_path / "studies"
+    rows = [{"env_id": GENERALIST, "action": action, "episode": k, "seed": k, "carbon_return": 1.0 + (action == 20) + k,
+             "thaw_return": -1.0 + k} for action in PLANTING for k in (0, 1)]
+    stored.write(studies / "constant_plans.csv", pd.DataFrame(rows), {})
+    runs = tmp_path / "runs"
+    write_run(runs / "random", "random_valid", carbon=(0.5,) * 3, thaw=(-3.5,) * 3)
+    for seed in (1, 2, 3):
+        for weight in experiments.WEIGHTS:
+            write_run(runs / f"{seed}-{weight}", "eupg_fixed_lambda", seed, (1.5,), (-3.0,), (weight,),
+                      preference=weight, vectorization="lockstep")
+    finding, ours = found(asymmetry.carbon_is_learnt, runs, studies)
+    # random actions: 0.5 on average; the best plan for carbon: 2.5; the agent: 1.5
+    assert ours["carbon return less that of random actions, same sites"].value == pytest.approx(1)
+    assert ours["the same of the best constant plan"].value == pytest.approx(2)
+    assert ours["share of it learnt"].value == pytest.approx(0.5) and finding.verdict == REPRODUCED
+    finding, ours = found(asymmetry.thaw_is_not_learnt, runs, studies)
+    assert ours["share of it learnt"].value == pytest.approx(0.5 / 3) and finding.verdict == REPRODUCED
+    finding, ours = found(asymmetry.asymmetry, runs, studies)
+    assert ours["carbon less thaw"].value == pytest.approx(1 / 3) and finding.verdict == REPRODUCED
+
+
+def test_controls_are_told_apart_by_their_flags(tmp_path):
+    for seed in (1, 2, 3):
+        for name, script, returns, flags in (("main", "ppo_curriculum", 2, {}),
+                                             ("coin", "ppo_curriculum", 5, {"selector": "coin"}),
+                                             ("twice", "ppo_curriculum", 7, {"total_timesteps": 600_000}),
+                                             ("half", "ppo_gated", 1, {"total_timesteps": 150_000}),
+                                             ("double", "ppo_gated", 3, {"total_timesteps": 600_000})):
+            write_run(tmp_path / f"{name}{seed}", script, seed, (returns,) * 3, (returns,) * 3,
+                      vectorization="lockstep", **flags)
+    wanted = {curriculum.same_training: (1, REPRODUCED), curriculum.coin: (-3, NOT_REPRODUCED),
+              curriculum.more_data: (-1, NOT_REPRODUCED), curriculum.twice_the_budget: (4, REPRODUCED)}
+    for claim, (apart, verdict) in wanted.items():
+        finding, ours = found(claim, tmp_path)
+        assert (ours["difference, paired by seed"].value, finding.verdict) == (apart, verdict)
+    finding, _ = found(curriculum.raw_network, tmp_path)
+    assert finding.verdict == NO_RUNS and "--raw-selector" in finding.rule
+
+
+def test_time_from_the_log_and_the_benchmark(three_seeds):
+    (three_seeds / "studies").mkdir()
+    benchmark = pd.DataFrame([("episode", "50-year episode, 1 stand", 0.3, 0.2, 0.4, 1.0, 7),
+                              ("episode", "50-year episode, 16 stands in lockstep, each", 0.05, 0.04, 0.06, 1.0, 7),
+                              ("threads", "1 thread, 64 stands", 9.0, 9.0, 9.0, 1.0, 7),
+                              ("threads", "16 threads, 64 stands", 90.0, 90.0, 90.0, 10.0, 7)],
+                             columns=["section", "what", "median", "low", "high", "ratio", "repeats"])
+    benchmark.to_csv(three_seeds / "benchmark.csv", index=False)
+    studies = three_seeds / "studies"
+    finding, ours = found(speed.episode, three_seeds, studies)
+    assert finding.verdict == REPRODUCED and ours["one stand [s]"].value == 0.3
+    assert found(speed.pure_python, three_seeds, studies)[0].verdict == UNTESTABLE
+    assert found(speed.workers, three_seeds, studies)[0].verdict == REPRODUCED  # ten times, the paper's least is four
+    finding, ours = found(speed.TRAINING[0], three_seeds)
+    assert finding.verdict == REPRODUCED  # 600 + 120 s
+    assert ours["hours of 300,000 steps in lockstep on one core"].value == pytest.approx(0.2)
+    assert found(speed.dollars, three_seeds)[1]["USD a training"].value == pytest.approx(0.3 * 0.68)
+
+
+# ---------------------------------------------------------------------------------- all of it
+
+def training_episodes(steps, seed):
+    generator = np.random.default_rng(seed)
+    number = 60
+    table = pd.DataFrame({"global_step": np.linspace(steps / number, steps, number).astype(int), "episode": 1, "env": 0,
+                          "site_seed": generator.integers(1000, size=number), "preference": 0.5})
+    for name in ("carbon_return", "thaw_return", "scalarized_return", "final_density", "mean_density",
+                 "final_conifer_fraction", "mean_conifer_fraction", "score"):
+        table[name] = generator.normal(size=number)
+    return table.assign(threshold=0.5 + 0.001 * generator.integers(3, size=number),
+                        selected=generator.integers(2, size=number))
+
+
+def write_everything(folder, jobs):
+    """A finished run of every job and a table of every study, of random numbers."""
+    generator = np.random.default_rng(0)
+    for number, job in enumerate(jobs):
+        if job.is_study:
+            continue
+        flags = {name: value for name, value in job.flags.items() if name not in ("seed", "run_dir")}
+        weights = (flags["preference"],) if "preference" in flags else (0.0, 0.5, 1.0)
+        returns = generator.normal(size=(2, len(weights)))
+        run = folder / "runs" / str(number)
+        write_run(run, job.script, job.flags.get("seed", 1), *returns, weights=weights,
+                  **{"env_id": job.env_id} | flags)
+        if job.trains:
+            training_episodes(flags.get("total_timesteps", 300_000), number).to_csv(run / "episodes.csv", index=False)
+    studies = folder / "studies"
+    names = ["carbon_return", "thaw_return", *MEANS]
+    pairs = pd.DataFrame(generator.normal(size=(4 * len(PAIRS), 2 * len(names))),
+                         columns=[f"{side}_{name}" for side in ("lower", "upper") for name in names])
+    stored.write(studies / "mechanism_pairs.csv", pairs.assign(pair=[*PAIRS] * 4), {})
+    plans = pd.DataFrame([(env, action, seed, *generator.normal(size=2)) for env in (GENERALIST, "boreal-balanced-v0")
+                          for action in PLANTING for seed in (0, 1)],
+                         columns=["env_id", "action", "seed", "carbon_return", "thaw_return"])
+    stored.write(studies / "constant_plans.csv", plans, {})
+    sites = pd.DataFrame(generator.normal(size=(12, 4)),
+                         columns=["latitude_deg", "warming_mj_m2", "cooling_mj_m2", "thaw_return"])
+    stored.write(studies / "site_warming.csv", sites.assign(seed=[1, 1, 2, 2] * 3, selected=[0, 1] * 6), {})
+    for name in ("fronts", "variance"):
+        shutil.copytree(experiments.ROOT / "results" / name, folder / name)
+    return studies
+
+
+BENCHMARKED = {speed.episode, speed.workers, speed.solver_share, speed.memory, speed.memory_of_all}
+
+
+def test_the_jobs_fill_every_claim(tmp_path):
+    jobs = experiments.jobs(seeds=[1, 2])
+    studies = write_everything(tmp_path, jobs)
+    evidence = Evidence(results_of(tmp_path / "runs", studies, jobs))
+    every = [claim for theme in claims.THEMES for claim in theme.CLAIMS]
+    findings = {claim: claims.judge(claim, evidence) for claim in every}
+    assert {claim.statement for claim, one in findings.items() if one.verdict == NO_RUNS} == {
+        claim.statement for claim in BENCHMARKED}  # no benchmark was run
+    assert all(one.rows for one in findings.values() if one.verdict != NO_RUNS)
+    assert not [row for one in findings.values() for row in one.rows if row.ours == "no runs yet"]
+
+
+def test_quick_jobs_raise_nothing(tmp_path):
+    jobs = experiments.quick_jobs()
+    studies = write_everything(tmp_path, jobs)
+    text, counts = claims.document(results_of(tmp_path / "runs", studies, jobs))
+    assert counts[NO_RUNS] < counts.total() / 3 and "## What has been run" in text
+
+
+def test_the_document(tmp_path, capsys):
+    for name in ("first", "second"):
+        claims.main(claims.Args(runs_dir=(TINY_RUNS,), output=tmp_path / name / "claims.md"))
+    text = (tmp_path / "first" / "claims.md").read_text()
+    assert text == (tmp_path / "second" / "claims.md").read_text()
+    numbers = [int(number) for number in re.findall(r"^### (\d+)\. ", text, re.MULTILINE)]
+    assert numbers == list(range(1, len(numbers) + 1)) and len(numbers) >= 30
+    assert {*re.findall(r"\(#(claim-\d+)\)", text)} == {*re.findall(r'id="(claim-\d+)"', text)}
+    assert f"{len(numbers)} claims of the paper" in capsys.readouterr().out
+    lacking = "No runs yet: `python analysis/reproduce.py --only main controls` (python cleanrl_style/ppo_curriculum.py"
+    assert f"{lacking} --seed 1 --vectorization lockstep --selector coin is lacking)" in text
+    assert "| `main` | 2 | 35 | `constant_plans`" in text
+
+
+def test_without_runs_it_says_which_command_makes_them(tmp_path):
+    claims.main(claims.Args(runs_dir=(tmp_path / "none",), output=tmp_path / "claims.md"))
+    assert "No runs yet: `python analysis/reproduce.py --only main`" in (tmp_path / "claims.md").read_text()
+
+
+def test_prose_has_no_numbers():
+    for theme in claims.THEMES:
+        for claim in theme.CLAIMS:
+            prose = re.sub(r"`[^`]*`", "", claim.why + claim.note)  # but in names of files and environments
+            assert not re.search(r"\d", prose), claim.statement
