@@ -14,7 +14,7 @@ from analysis.experiments import Job
 from cleanrl_style.ppo_gated import Args
 
 COUNTS = {"main": 36, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 25, "variants": 24,
-          "mechanisms": 2}
+          "mechanisms": 2, "single": 6, "difficulty": 2}
 
 
 def test_experiments():
@@ -52,7 +52,7 @@ def test_a_variant_knows_its_run():
     protocol.resolve(args)
     config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}
     config = json.loads(json.dumps(config))
-    assert job.made(config) and job.row[2] == runs.setting(config["not_default"])
+    assert job.made(config) and job.row[2] == runs.setting(config["not_default"], args.env_id)
     balanced = boreal_env.Reward().carbon_scale / boreal_env.BALANCED_CARBON_SCALE
     assert experiments.REWARD_SCALES == (pytest.approx(balanced, abs=0.005), 1.0)
 
