@@ -35,7 +35,7 @@ WITHOUT_SITE = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group !
 AGENT = ["method", "environment", "setting", "seed", "trained_on", "trained_for"]
 KEY = [*AGENT, "run", "site", "policy", "weight"]
 PLAYED = [*GAINS, "scalarized_gain", "scalarized_gain_error"]
-JUDGED = ["best_scalarized_gain", "share", "hypervolume_share"]
+JUDGED = ["best_scalarized_gain", "best_scalarized_gain_error", "share", "hypervolume_share"]
 TEXT = ("setting", "trained_on", "trained_for", "run", "environment", "seed")
 
 
@@ -54,19 +54,23 @@ class Args:
 # ------------------------------------------------------------------------------------- the best known plans
 
 
-def read_plans(folder: Path, physics: str, sites: int | None, weathers: int | None) -> dict[int, pd.DataFrame]:
+def read_plans(folder: Path, physics: str, sites=None, weathers: int | None = None) -> dict[int, pd.DataFrame]:
     """Site's seed -> its plans' gains, a row a plan and weather: kind, actions, weather, RETURNS, GAINS.
 
-    sites, weathers : only the first so many of each. Exits if the tables are not of this physics.
+    sites : seeds of the sites (None: all); weathers : only the first so many. Exits if the tables are not there or not
+    of this physics.
     """
     plans = {}
-    for path in sorted(folder.glob("*-all-on.csv"))[:sites]:
+    for path in sorted(folder.glob("*-all-on.csv")):
         with path.open(encoding="utf-8") as file:
             made_by = json.loads(file.readline().removeprefix("#"))
+        site = made_by["case"][0]
+        if sites is not None and site not in sites:
+            continue
         if made_by["physics"] != physics:
             sys.exit(f"error: {path} is of another physics; `python analysis/fronts.py` makes it anew")
         table = stored.read(path, text=("actions",))
-        plans[made_by["case"][0]] = with_gains(table[table.weather.isin(sorted(set(table.weather))[:weathers])])
+        plans[site] = with_gains(table[table.weather.isin(sorted(set(table.weather))[:weathers])])
     if not plans:
         sys.exit(f"error: no fronts in {folder}; `python analysis/fronts.py` makes them")
     return plans
@@ -80,14 +84,26 @@ def with_gains(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**dict(zip(GAINS, gains.T, strict=True)))
 
 
-def best_of(plans: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Mean gains of a site's plans, found and constant, (plans, 2), and the point that hypervolumes count from.
+def gains_of(plans: pd.DataFrame) -> np.ndarray:
+    """Gains of a site's plans, found and constant, (plans, weathers, 2)."""
+    ordered = plans.sort_values(["kind", "actions", "weather"])[GAINS].to_numpy()
+    return ordered.reshape(-1, plans.weather.nunique(), 2)
 
-    Counted from zero change, or from the worst gain of the front where that is less.
+
+def best_at(gains: np.ndarray, weight: float) -> dict:
+    """The best mean scalarised gain of plans (plans, weathers, 2), and its standard error over the weathers."""
+    scalarized = protocol.scalarize(gains[..., 0], gains[..., 1], weight)
+    best = scalarized[scalarized.mean(axis=1).argmax()]
+    return {"best_scalarized_gain": best.mean(), "best_scalarized_gain_error": best.std(ddof=1) / np.sqrt(len(best))}
+
+
+def hypervolume_share(points: np.ndarray, plans: np.ndarray) -> float:
+    """Hypervolume of mean gains (n, 2) in that of a site's plans (plans, 2).
+
+    Counted from zero change, or from the worst gain of the plans' front where that is less.
     """
-    means = plans.groupby(["kind", "actions"])[GAINS].mean()
-    front = metrics.nondominated(means.to_numpy())
-    return means.to_numpy(), np.minimum(front.min(axis=0), 0.0)
+    reference = np.minimum(metrics.nondominated(plans).min(axis=0), 0.0)
+    return metrics.hypervolume(points, reference) / metrics.hypervolume(plans, reference)
 
 
 def constant_plans(plans: dict[int, pd.DataFrame], weights) -> pd.DataFrame:
@@ -154,13 +170,17 @@ def means_of(gains: np.ndarray, weight: float) -> dict:
     return dict(zip(PLAYED, np.round([*gains.mean(axis=0), scalarized.mean(), error], 6), strict=True))
 
 
-def judge(policy, kwargs: dict, plans: dict[int, pd.DataFrame], weights, policies, played) -> pd.DataFrame:
-    """Mean gains of a policy, a row a site, kind of policy and weight."""
+def judge(policy, kwargs: dict, plans: dict[int, pd.DataFrame], weights, learnt: bool, played) -> pd.DataFrame:
+    """Mean gains of a policy, a row a site, kind of policy and weight.
+
+    One that is not learnt does not look at the preference and has one kind: it plays once for all weights.
+    """
     sites = list(plans)
     weathers = sorted(set(plans[sites[0]].weather))
     rows = []
-    for kind in policies:
-        returns = play(policy, kwargs, sites, weathers, weights, kind == "greedy", played)
+    for kind in protocol.POLICIES if learnt else ("sampled",):
+        returns = play(policy, kwargs, sites, weathers, weights if learnt else (0.0,), kind == "greedy", played)
+        returns = np.broadcast_to(returns, (len(weights), *returns.shape[1:]))
         for k, site in enumerate(sites):
             first = plans[site].drop_duplicates("weather").set_index("weather").loc[weathers]
             zero = first[RETURNS].to_numpy() - first[GAINS].to_numpy()
@@ -180,18 +200,13 @@ def strategy(name: str):
     return probabilities
 
 
-def sees_site(arguments: dict) -> bool:
-    """Whether an agent was trained to observe the site's parameters."""
-    return arguments["mode"] != "site-specific" and not arguments.get("hide_site", False)
-
-
 def agent_policy(folder: Path, config: dict):
     """A run's agent, from the class of its script and its checkpoint, as a policy of the evaluation."""
     import torch  # only here: reading the table does without
 
     module = importlib.import_module(f"cleanrl_style.{config['script']}")
     arguments = config["arguments"]
-    kwargs = {} if sees_site(arguments) else {"observation_groups": WITHOUT_SITE}
+    kwargs = {"observation_groups": WITHOUT_SITE} if arguments.get("hide_site", False) else {}
     spaces = SimpleNamespace(single_observation_space=boreal_env.BorealVectorEnv(1, **kwargs).single_observation_space)
     two_values = arguments.get("per_objective_advantages", False)
     agent = module.Agent(spaces, 2) if two_values else module.Agent(spaces)
@@ -216,22 +231,25 @@ def name_of(config: dict) -> dict:
     """The columns AGENT and run of a run's config.json."""
     arguments = config["arguments"]
     text = json.dumps(config, sort_keys=True)
-    names = (config["script"], arguments["env_id"], runs.setting(config["not_default"]), arguments["seed"],
-             arguments["site_seed"], arguments.get("preference"))  # fmt: skip
+    names = (config["script"], arguments["env_id"], runs.setting(config["not_default"], arguments["env_id"]),
+             arguments["seed"], arguments["site_seed"], arguments.get("preference"))  # fmt: skip
     as_text = ["" if value is None else str(value) for value in names]
     return dict(zip(AGENT, as_text, strict=True)) | {"run": hashlib.sha256(text.encode()).hexdigest()[:12]}
 
 
 def agents(folder: Path, sites) -> list[tuple[Path, dict]]:
-    """Finished runs with a checkpoint below a folder, but for those of one site that is not among the sites."""
+    """Finished runs with a checkpoint below a folder, but for those of one site that is not among the sites.
+
+    Nor does an agent of the site-specific mode count: it knows one weather and no temperature noise.
+    """
     found = []
     for path in runs.run_folders(folder):
         if not (path / "checkpoint.pt").exists() or runs.table_path(path, "evaluation") is None:
             continue
         config = runs.read_config(path)
         arguments = config["arguments"]
-        boreal = arguments["env_id"] in protocol.MODES
-        if boreal and (arguments["mode"] != "site-specific" or arguments["site_seed"] in sites):
+        generalist = protocol.MODES.get(arguments["env_id"]) == "generalist"
+        if generalist and arguments["site_seed"] in (None, *sites):
             found.append((path, config))
     return found
 
@@ -246,31 +264,37 @@ def has(table: pd.DataFrame, name: dict) -> bool:
     return bool((table[[*AGENT, "run"]] == [name[column] for column in (*AGENT, "run")]).all(axis=1).any())
 
 
+def is_known(best):
+    """Whether a best gain, or each of a column, is above twice its standard error."""
+    return best.best_scalarized_gain > 2 * best.best_scalarized_gain_error
+
+
 def complete(table: pd.DataFrame, plans: dict[int, pd.DataFrame]) -> pd.DataFrame:
     """The table in order, with JUDGED: each gain against the best known plans of its site.
 
-    share : of the best scalarised gain; NaN where that is not above twice the standard error of the row's own.
-    hypervolume_share : of all weights' gains, in that of the plans; NaN for an agent of one weight.
+    share : of the best scalarised gain; NaN where that is not above twice its standard error, as where thaw is clipped
+    whatever is done. hypervolume_share : of all weights' gains together; NaN for an agent of one weight, and on a site
+    where either objective alone has no share.
     """
-    best = {site: best_of(one) for site, one in plans.items()}
-    table = table[[*KEY, *PLAYED]].sort_values(KEY, kind="stable", ignore_index=True)
-    table["best_scalarized_gain"] = [protocol.scalarize(*best[row.site][0].T, row.weight).max()
-                                     for row in table.itertuples()]  # fmt: skip
-    known = table.best_scalarized_gain > 2 * table.scalarized_gain_error
-    table["share"] = (table.scalarized_gain / table.best_scalarized_gain).where(known)
+    gains = {site: gains_of(one) for site, one in plans.items()}
+    table = table[[*KEY, *PLAYED]].astype({"site": int, "weight": float, **dict.fromkeys(PLAYED, float)})
+    table = table.sort_values(KEY, kind="stable", ignore_index=True)
+    best = [best_at(gains[row.site], row.weight) for row in table.itertuples()]
+    table = pd.concat([table, pd.DataFrame(best)], axis=1)
+    table["share"] = (table.scalarized_gain / table.best_scalarized_gain).where(is_known(table))
     table["hypervolume_share"] = np.nan
     for (*_, site, _), rows in table.groupby([*AGENT, "run", "site", "policy"], sort=False):
-        points, reference = best[site]
-        if rows.trained_for.iloc[0] == "":
-            share = metrics.hypervolume(rows[GAINS], reference) / metrics.hypervolume(points, reference)
+        ends_known = all(is_known(SimpleNamespace(**best_at(gains[site], weight))) for weight in (0.0, 1.0))
+        if rows.trained_for.iloc[0] == "" and ends_known:
+            share = hypervolume_share(rows[GAINS].to_numpy(), gains[site].mean(axis=1))
             table.loc[rows.index, "hypervolume_share"] = share
-    return table
+    return table[[*KEY, *PLAYED, *JUDGED]]
 
 
 def main(args: Args) -> None:
     """Evaluate what the table lacks, and write it after each agent."""
     physics = open_loop.fingerprint()
-    plans = read_plans(FRONTS_DIR, physics, *((2, 2) if args.quick else (None, None)))
+    plans = read_plans(FRONTS_DIR, physics, *((experiments.FRONT_SITES[:2], 2) if args.quick else ()))
     weights = experiments.QUICK_EVALUATION["eval_weights"] if args.quick else WEIGHTS
     weathers = sorted(set(next(iter(plans.values())).weather))
     settings = {"sites": list(plans), "weathers": weathers, "weights": weights, "physics": physics}
@@ -284,18 +308,19 @@ def main(args: Args) -> None:
     constant = constant_plans(plans, weights).assign(run="")
     table = table[~table.method.isin((BEST_OF_SITE, BEST_OF_ALL))]
     table = pd.concat([table, constant.assign(**dict.fromkeys(AGENT[1:], ""))], ignore_index=True)
-    todo = [(dict.fromkeys([*AGENT, "run"], "") | {"method": name}, (strategy(name), {}), (0.0,), ("sampled",))
+    todo = [(dict.fromkeys([*AGENT, "run"], "") | {"method": name}, (strategy(name), {}), weights)
             for name in experiments.HEURISTICS]  # fmt: skip
     for folder, config in agents(args.runs_dir or (experiments.QUICK_DIR if args.quick else runs.RUNS_DIR), plans):
         own = (config["arguments"]["preference"],) if "preference" in config["arguments"] else weights
-        todo.append((name_of(config), (folder, config), own, protocol.POLICIES))
+        todo.append((name_of(config), (folder, config), own))
     todo = [one for one in todo if args.overwrite or not has(table, one[0])]
     print(f"{len(todo)} agents and strategies that {path} does not have", flush=True)
 
     def where(name):
         return {site: one for site, one in plans.items() if name["trained_on"] in ("", str(site))}
 
-    episodes = [len(where(name)) * len(weathers) * len(own) * len(kinds) for name, _, own, kinds in todo]
+    # a learnt policy plays every weight, greedy and sampled
+    episodes = [len(where(name)) * len(weathers) * (2 * len(own) if name["run"] else 1) for name, _, own in todo]
     progress = protocol.Progress("distance", sum(episodes), "episodes")
     done = 0
 
@@ -304,12 +329,9 @@ def main(args: Args) -> None:
         done += number
         progress.show(done)
 
-    for name, source, own, kinds in todo:
+    for name, source, own in todo:
         policy, kwargs = agent_policy(*source) if name["run"] else source
-        judged = judge(policy, kwargs, where(name), own, kinds, played)
-        if not name["run"]:  # it does not look at the preference
-            judged = pd.concat([judged.assign(weight=weight) for weight in weights], ignore_index=True)
-            judged["scalarized_gain"] = protocol.scalarize(judged[GAINS[0]], judged[GAINS[1]], judged.weight).round(6)
+        judged = judge(policy, kwargs, where(name), own, bool(name["run"]), played)
         table = pd.concat([without(table, name), judged.assign(**name)], ignore_index=True)
         stored.write(path, complete(table, plans), settings)
     table = complete(table, plans)

@@ -13,8 +13,8 @@ TRAINED = (*METHODS, "eupg_fixed_lambda")
 STUDIES = ("constant_plans", "mechanism_pairs", "site_warming", "signal_to_noise", "distance_to_best")
 WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SITE_SEEDS = (1, 2, 3, 4, 5)
-# Three of the twelve sites of results/fronts: a typical one; one where the carbon end of the front costs thaw; and one of
-# weak wind, where planting costs it and thinning does not.
+# Three of the twelve sites of results/fronts: a typical one, one where the carbon end of the front costs thaw, and one
+# of weak wind, where planting costs it and thinning does not.
 FRONT_SITES = (3_000_000_078, 3_000_000_210, 3_000_000_058)
 GENERALIST_STEPS, SITE_SPECIFIC_STEPS = 300_000, 100_000
 # analysis/measure_balance.py: both returns vary equally between policies at a carbon scale of 1.4 kgC m-2 yr-1; the

@@ -220,8 +220,9 @@ def estimates(sites: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     sites and all dice; site_noise, about the site's mean; state_noise, about the mean of what is known when the action
     is taken. The signal to noise is the effect over each of them.
     """
-    site_variance = sites["site_squares"].sum(axis=-1) / sites["site_freedom"].sum(axis=-1)
-    state_variance = sites["past_squares"].sum(axis=-1) / sites["past_freedom"].sum(axis=-1)
+    with np.errstate(invalid="ignore"):  # NaN where no site, or no past, has two pairs
+        site_variance = sites["site_squares"].sum(axis=-1) / sites["site_freedom"].sum(axis=-1)
+        state_variance = sites["past_squares"].sum(axis=-1) / sites["past_freedom"].sum(axis=-1)
     # the variance of the sites' means has some of the variance within them, which is not to count twice
     between = (sites["first"].var(axis=-1, ddof=1) + sites["second"].var(axis=-1, ddof=1)) / 2
     variance = between + site_variance * (1 - (1 / sites["pairs"]).mean(axis=-1))
@@ -311,7 +312,9 @@ def analyse(cases) -> tuple[pd.DataFrame, pd.DataFrame]:
                 rows.append(case | {"weighting": weighting} | row | (shares if weighting == "return" else {}))
     table = pd.DataFrame(rows)
     key = ["reference", "contrast", "year", "objective"]
-    whole = table[table.weighting == "return"].set_index(key).effect
+    whole = table[table.weighting == "return"].set_index(key)
+    # what an advantage carries of an effect that is not told from none is no number
+    whole = whole.effect.where(whole.effect_low * whole.effect_high > 0)
     table["carried"] = table.effect / whole.loc[pd.MultiIndex.from_frame(table[key])].to_numpy()
     years = pd.concat(curves, ignore_index=True)
     return table, years[[*key, "years_after", "effect", "effect_low", "effect_high"]]
