@@ -57,6 +57,18 @@ def test_a_variant_knows_its_run():
     assert experiments.REWARD_SCALES == (pytest.approx(balanced, abs=0.005), 1.0)
 
 
+def test_agents_of_one_site_are_a_row_of_their_own():
+    job = next(job for job in experiments.jobs(["single"], [2]) if job.trains)
+    args = Args(**job.flags)
+    protocol.resolve(args)
+    config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}
+    config = json.loads(json.dumps(config))
+    assert job.made(config) and args.site_seed == experiments.FRONT_SITES[1] and args.mode == "generalist"
+    assert runs.setting(config["not_default"], args.env_id) == job.row[2] and job.row[2].endswith("sites=1")
+    in_one_world = runs.setting({"site_seed": 3}, "boreal-site-specific-v0")
+    assert (in_one_world, runs.setting({"site_seed": 3}, "boreal-generalist-v0")) == ("default", "sites=1")
+
+
 def test_every_row_has_its_first_job():
     rows = [job.row for job in experiments.jobs() if not job.is_study]
     assert ("ppo_gated", "boreal-generalist-v0", "total_timesteps=150000, vectorization=lockstep") in rows

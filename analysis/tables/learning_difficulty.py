@@ -8,7 +8,7 @@ import pandas as pd
 
 from analysis import stored
 from analysis.open_loop import OBJECTIVES
-from analysis.signal_to_noise import CONTRASTS, UNIFORM
+from analysis.signal_to_noise import CONTRASTS, EVERY, UNIFORM, YEARS, episodes_needed
 
 TITLE = "Difficulty of learning"
 COLUMNS = {"of": "of", "quantity": "quantity", "carbon": "carbon", "thaw": "thaw"}
@@ -28,6 +28,12 @@ EFFECTS = {
     "effect that GAE rewards carry %": ("GAE", "carried", 100),
     "episodes, site baseline, GAE": ("GAE", "site_episodes", 1),
 }
+#: Row -> (weighting, noise) of a choice that is the same in every year.
+SHARED = {
+    "episodes, one choice for all years": ("return", "noise"),
+    "episodes, one choice for all years, site baseline": ("return", "site_noise"),
+    "episodes, one choice for all years, site baseline, GAE": ("GAE", "site_noise"),
+}
 
 
 def variance_components(results) -> pd.DataFrame | None:
@@ -44,6 +50,22 @@ def of_objectives(rows: pd.DataFrame, column: str, factor: float) -> dict:
             if f"{column}{end}" in rows and objective in rows.index:
                 row[f"{objective}{end}"] = factor * rows.loc[objective, f"{column}{end}"]
     return row
+
+
+def shared_episodes(case: pd.DataFrame, noise: str) -> float:
+    """Episodes to tell two actions apart if all years of an episode bear on the choice; case: a row a year of it.
+
+    The gradient of a parameter that sets the same choice in all years is a sum over them of the score times the
+    advantage. Scores have mean zero given the past, so the effects add up, and so do the variances. Effect and variance
+    are taken as linear between the years that were played, and as none at the episode's end.
+    """
+    case = case[case.year != EVERY].assign(year=lambda table: table.year.astype(int)).sort_values("year")
+    years = np.arange(YEARS)
+
+    def all_years(values):
+        return np.interp(years, [*case.year, YEARS], [*values, 0.0]).sum()
+
+    return float(episodes_needed(abs(all_years(case.effect)) / all_years(case[noise] ** 2) ** 0.5))
 
 
 def make(results) -> pd.DataFrame:
@@ -67,5 +89,11 @@ def make(results) -> pd.DataFrame:
         for quantity, (weighting, column, factor) in EFFECTS.items():
             there = case[case.weighting == weighting].set_index("objective")
             rows.append({"of": contrast, "quantity": quantity, **of_objectives(there, column, factor)})
+        uniform = table[(table.reference == UNIFORM) & (table.contrast == contrast)]
+        for quantity, (weighting, noise) in SHARED.items():
+            years = {objective: uniform[(uniform.weighting == weighting) & (uniform.objective == objective)]
+                     for objective in OBJECTIVES}  # fmt: skip
+            needed = {objective: shared_episodes(case, noise) for objective, case in years.items()}
+            rows.append({"of": contrast, "quantity": quantity, **needed})
     columns = [f"{objective}{end}" for objective in OBJECTIVES for end in ("", "_low", "_high")]
     return pd.DataFrame(rows, columns=["of", "quantity", *columns]).replace(np.inf, np.nan)
