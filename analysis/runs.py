@@ -53,10 +53,10 @@ class Run:
 
 def setting(not_default: dict, env_id: str) -> str:
     """name=value of the arguments that make a row, "default" if there are none; which single site, makes none."""
-    items = sorted((name, value) for name, value in not_default.items() if name not in NOT_A_SETTING)
+    items = {name: value for name, value in not_default.items() if name not in NOT_A_SETTING}
     if not_default.get("site_seed") is not None and MODES.get(env_id) != "site-specific":
-        items.append(("sites", 1))
-    return ", ".join(f"{name}={as_text(value)}" for name, value in items) or "default"
+        items["site_seed"] = "one"
+    return ", ".join(f"{name}={as_text(value)}" for name, value in sorted(items.items())) or "default"
 
 
 def as_text(value) -> str:

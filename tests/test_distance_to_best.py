@@ -241,7 +241,7 @@ def test_the_table_of_shares(fronts_dir, calls, tmp_path):
     assert row.seeds == 2 and row["share_0.5"] == pytest.approx(100 / 2.25)
     assert row["share_0.5_low"] == row["share_0.5"]
     alone = table.xs("1, with agents of their own", level="sites")
-    assert alone.loc[("ppo_gated", "sites=1", "greedy")].seeds == 1
+    assert alone.loc[("ppo_gated", "site_seed=one", "greedy")].seeds == 1
     assert alone.loc[("ppo_gated", "default", "greedy")].seeds == 2
     assert table.loc[("zero_change", "", "sampled", "2, all"), "share_1"] == pytest.approx(100 / 3)
     missing = share_table.make(Results((tmp_path / "runs",), experiments.jobs(), tmp_path / "no studies"))

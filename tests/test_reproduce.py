@@ -64,9 +64,9 @@ def test_agents_of_one_site_are_a_row_of_their_own():
     config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}
     config = json.loads(json.dumps(config))
     assert job.made(config) and args.site_seed == experiments.FRONT_SITES[1] and args.mode == "generalist"
-    assert runs.setting(config["not_default"], args.env_id) == job.row[2] and job.row[2].endswith("sites=1")
+    assert runs.setting(config["not_default"], args.env_id) == job.row[2] and "site_seed=one" in job.row[2]
     in_one_world = runs.setting({"site_seed": 3}, "boreal-site-specific-v0")
-    assert (in_one_world, runs.setting({"site_seed": 3}, "boreal-generalist-v0")) == ("default", "sites=1")
+    assert (in_one_world, runs.setting({"site_seed": 3}, "boreal-generalist-v0")) == ("default", "site_seed=one")
 
 
 def test_every_row_has_its_first_job():
