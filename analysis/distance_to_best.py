@@ -238,18 +238,24 @@ def name_of(config: dict) -> dict:
 
 
 def agents(folder: Path, sites) -> list[tuple[Path, dict]]:
-    """Finished runs with a checkpoint below a folder, but for those of one site that is not among the sites.
+    """Finished runs with a checkpoint below a folder, of scripts that are here.
 
-    Nor does an agent of the site-specific mode count: it knows one weather and no temperature noise.
+    Agents of one site count if it is one of the sites; those of the site-specific mode do not: they know one weather and
+    no temperature noise.
     """
     found = []
     for path in runs.run_folders(folder):
         if not (path / "checkpoint.pt").exists() or runs.table_path(path, "evaluation") is None:
             continue
-        config = runs.read_config(path)
+        try:
+            config = runs.read_config(path)
+        except ValueError as error:
+            print(f"left out: {path}: {error}", file=sys.stderr)
+            continue
         arguments = config["arguments"]
         generalist = protocol.MODES.get(arguments["env_id"]) == "generalist"
-        if generalist and arguments["site_seed"] in (None, *sites):
+        here = (experiments.ROOT / "cleanrl_style" / f"{config['script']}.py").exists()
+        if here and generalist and arguments["site_seed"] in (None, *sites):
             found.append((path, config))
     return found
 
@@ -314,7 +320,7 @@ def main(args: Args) -> None:
         own = (config["arguments"]["preference"],) if "preference" in config["arguments"] else weights
         todo.append((name_of(config), (folder, config), own))
     todo = [one for one in todo if args.overwrite or not has(table, one[0])]
-    print(f"{len(todo)} agents and strategies that {path} does not have", flush=True)
+    print(f"{len(todo)} agents and strategies to evaluate, for {path}", flush=True)
 
     def where(name):
         return {site: one for site, one in plans.items() if name["trained_on"] in ("", str(site))}

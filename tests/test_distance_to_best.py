@@ -179,6 +179,10 @@ def test_only_what_the_table_lacks_is_evaluated(fronts_dir, calls, tmp_path):
     runs, path = tmp_path / "runs", tmp_path / "studies" / "distance_to_best.csv"
     add_run(runs / "b", "ppo_gated", seed=2)
     write_run(runs / "no checkpoint", "ppo_gated", seed=3)
+    add_run(runs / "elsewhere", "ppo_unknown")
+    (runs / "damaged").mkdir()
+    for name in ("config.json", "evaluation.csv", "checkpoint.pt"):
+        (runs / "damaged" / name).touch()
     assert evaluate(runs, calls) == ["zero_change", "b"]
     first = path.read_bytes()
     assert evaluate(runs, calls) == [] and path.read_bytes() == first
