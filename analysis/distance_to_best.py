@@ -240,8 +240,8 @@ def name_of(config: dict) -> dict:
 def agents(folder: Path, sites) -> list[tuple[Path, dict]]:
     """Finished runs with a checkpoint below a folder, of scripts that are here.
 
-    Agents of one site count if it is one of the sites; those of the site-specific mode do not: they know one weather and
-    no temperature noise.
+    Agents of one site count if it is one of the sites; those of the site-specific mode do not: they know one weather
+    and no temperature noise.
     """
     found = []
     for path in runs.run_folders(folder):
