@@ -108,8 +108,8 @@ def prepare(args) -> dict:
         fail(f"--mode {args.mode} contradicts --env-id {args.env_id}, which is {MODES[args.env_id]}")
     if not boreal and (args.mode != "generalist" or args.thaw_formulation != "asymmetric"):
         fail(f"--mode and --thaw-formulation are for {', '.join(MODES)}, not for --env-id {args.env_id}")
-    if args.mode != "site-specific" and args.site_seed is not None:
-        fail("--site-seed is for --mode site-specific: in generalist mode every episode draws its site")
+    if not boreal and args.site_seed is not None:
+        fail(f"--site-seed is for {', '.join(MODES)}, not for --env-id {args.env_id}")
     env_kwargs = {"thaw_formulation": args.thaw_formulation} if boreal else {}
     if args.site_seed is not None:
         env_kwargs["site_seed"] = args.site_seed

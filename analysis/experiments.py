@@ -10,10 +10,13 @@ ROOT = Path(__file__).parents[1]
 HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 METHODS = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum")  # conditioned on the preference
 TRAINED = (*METHODS, "eupg_fixed_lambda")
-STUDIES = ("constant_plans", "training_gains", "mechanism_pairs", "site_warming")
-READING = ("training_gains", "site_warming")  # studies that read the runs before them
+STUDIES = ("constant_plans", "training_gains", "mechanism_pairs", "site_warming", "signal_to_noise", "distance_to_best")
+READING = ("training_gains", "site_warming", "distance_to_best")  # studies that read the runs before them
 WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SITE_SEEDS = (1, 2, 3, 4, 5)
+# Three of the twelve sites of results/fronts: a typical one, one where the carbon end of the front costs thaw, and one
+# of weak wind, where planting costs it and thinning does not.
+FRONT_SITES = (3_000_000_078, 3_000_000_210, 3_000_000_058)
 GENERALIST_STEPS, SITE_SPECIFIC_STEPS = 300_000, 100_000
 # analysis/measure_balance.py: both returns vary equally between policies at a carbon scale of 1.4 kgC m-2 yr-1; the
 # paper's rewards are at 2.0, so the carbon reward times 2.0 / 1.4
@@ -28,6 +31,8 @@ EXPERIMENTS = {
     "controls": "what of the curriculum it is that helps",
     "variants": "gated PPO with rescaled rewards, other advantages, fewer observations, another learning rate",
     "mechanisms": "physical conflicts, counterfactual pairs, warming of selected sites",
+    "single": "gated PPO on one site alone, under all its weathers and first stands",
+    "difficulty": "why thaw is hard to learn: signal to noise of an action; distance to the best known plans",
 }
 
 
@@ -95,7 +100,7 @@ class Job:
     @property
     def row(self) -> tuple[str, str, str]:
         """(script, environment, setting): the row of a table that its run belongs to."""
-        return self.script, self.env_id, setting(self.flags)
+        return self.script, self.env_id, setting(self.flags, self.env_id)
 
     def made(self, config: dict) -> bool:
         """Whether a run with this config.json is this job's."""
@@ -199,8 +204,25 @@ def mechanisms(seeds) -> list[Job]:
     return [Job("mechanisms", script) for script in ("mechanism_pairs", "site_warming")]
 
 
+def front_sites(seeds) -> list[Job]:
+    """Gated PPO on one site of the fronts; the site's number is the training seed too."""
+    jobs = []
+    for seed in seeds_of(len(FRONT_SITES), seeds):
+        site = {"site_seed": FRONT_SITES[seed - 1]}
+        jobs.append(Job("single", "zero_change", site))
+        jobs.append(trained("single", "ppo_gated", seed, total_timesteps=SITE_SPECIFIC_STEPS, ent_coef=0.0,
+                            per_objective_advantages=True, **site))
+    return jobs
+
+
+def difficulty(seeds) -> list[Job]:
+    """Studies of how hard thaw is to learn; the distance to the best plans reads the checkpoints of all runs."""
+    return [Job("difficulty", script) for script in ("signal_to_noise", "distance_to_best")]
+
+
 JOBS_OF = {"main": main_table, "fixed": fixed_weights, "site": single_sites, "thaw": thaw_formulations,
-           "balanced": balanced, "controls": controls, "variants": variants, "mechanisms": mechanisms}  # fmt: skip
+           "balanced": balanced, "controls": controls, "variants": variants, "mechanisms": mechanisms,
+           "single": front_sites, "difficulty": difficulty}  # fmt: skip
 
 
 def jobs(only=tuple(EXPERIMENTS), seeds: list[int] | None = None) -> list[Job]:

@@ -20,6 +20,7 @@ from analysis.figures import (
     individual_objectives,
     learning_asymmetry,
     learning_curves,
+    learning_difficulty,
     performance_panel,
     site_influence,
     strategies,
@@ -31,7 +32,7 @@ from analysis.make_tables import name_of
 from analysis.results import Results
 
 FIGURES = (learning_curves, learning_asymmetry, algorithm_comparison, strategies, site_influence, trade_off_coverage,
-           training_dynamics, performance_panel, individual_objectives, demographics)  # fmt: skip
+           training_dynamics, performance_panel, individual_objectives, demographics, learning_difficulty)  # fmt: skip
 
 
 @dataclass

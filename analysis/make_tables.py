@@ -16,9 +16,11 @@ from analysis.results import Results
 from analysis.tables import (
     curriculum_selection,
     detailed_objectives,
+    distance_to_best,
     growing_season_correlations,
     lambda_violations,
     learned_strategies,
+    learning_difficulty,
     main_results,
     physical_conflicts,
     runtime,
@@ -28,7 +30,8 @@ from analysis.tables import (
 from analysis.tables.common import readable, write_table
 
 TABLES = (main_results, thaw_formulations, growing_season_correlations, learned_strategies, warming_flux,
-          physical_conflicts, curriculum_selection, detailed_objectives, lambda_violations, runtime)  # fmt: skip
+          physical_conflicts, curriculum_selection, detailed_objectives, lambda_violations, runtime,
+          learning_difficulty, distance_to_best)  # fmt: skip
 
 
 @dataclass

@@ -65,17 +65,20 @@ def play(sites, seeds, plans, *, initial=None, constants=None, mechanisms=None, 
     stands = sim.Stands(len(plans), constants=constants, mechanisms=mechanisms, threads=threads)
     stands.start(everyone, sites, seeds, initial)
     start = stands.stocks(everyone)
-    reward = boreal_env.Reward()
     rewards = np.empty((*plans.shape, 2))
     actions = np.empty(plans.shape, dtype=int)
     record = np.empty((*plans.shape, len(sim.RECORD_NAMES)))
     for year in range(plans.shape[1]):
         actions[:, year] = _where_valid(plans[:, year], stands.stocks(everyone))
         record[:, year] = stands.step(actions[:, year])
-        parts = boreal_env.rewards_of_year(record[:, year], actions[:, year], reward, "asymmetric")
-        for k, name in enumerate(OBJECTIVES):
-            rewards[:, year, k] = parts[f"{name}_reward"]
+        rewards[:, year] = rewards_of_year(record[:, year], actions[:, year])
     return Episodes(rewards, actions, record, start)
+
+
+def rewards_of_year(record, actions) -> np.ndarray:
+    """The paper's [carbon, thaw] of a year, (n, 2); record (n, columns of sim.RECORD_NAMES), actions (n,)."""
+    parts = boreal_env.rewards_of_year(record, actions, boreal_env.Reward(), "asymmetric")
+    return np.column_stack([parts[f"{name}_reward"] for name in OBJECTIVES])
 
 
 def fingerprint() -> str:
@@ -87,10 +90,15 @@ def fingerprint() -> str:
     return hashlib.sha256((1e6 * rewards).round().astype(int).tobytes()).hexdigest()[:16]
 
 
+def valid_actions(stocks) -> np.ndarray:
+    """Actions that stands with these stocks (`sim.Stands.stocks`) can carry out in full, bool (n, 25)."""
+    density = stocks["density_stems_ha"]
+    classes = stocks["age_classes"].reshape(len(density), 2, -1)
+    return boreal_env.valid_actions(density, classes[:, :, _HARVESTABLE].sum(axis=(1, 2)))
+
+
 def _where_valid(actions, stocks) -> np.ndarray:
-    classes = stocks["age_classes"].reshape(len(actions), 2, -1)
-    harvestable = classes[:, :, _HARVESTABLE].sum(axis=(1, 2))
-    valid = boreal_env.valid_actions(stocks["density_stems_ha"], harvestable)
+    valid = valid_actions(stocks)
     return np.where(valid[np.arange(len(actions)), actions], actions, boreal_env.NO_CHANGE)
 
 

@@ -1,7 +1,7 @@
 """Runs every experiment of the paper (analysis/experiments.py), archives the runs, makes tables, figures and claims.
 
     python analysis/reproduce.py                     everything, the main table first; the same command goes on
-    python analysis/reproduce.py --only main thaw    some of main fixed site thaw balanced controls variants mechanisms
+    python analysis/reproduce.py --only main thaw    some of analysis/experiments.py's groups
     python analysis/reproduce.py --quick             every kind of experiment in small, in a few minutes
     python analysis/reproduce.py --list              the commands, without running them
 
@@ -22,7 +22,8 @@ import boreal_env
 from analysis import archive, claims, experiments, make_figures, make_tables, protocol, runs
 from sim.stands import available_cores
 
-Experiment = Literal["main", "fixed", "site", "thaw", "balanced", "controls", "variants", "mechanisms"]
+Experiment = Literal["main", "fixed", "site", "thaw", "balanced", "controls", "variants", "mechanisms", "single",
+                     "difficulty"]  # fmt: skip
 POLL_SECONDS, REPORT_SECONDS = 0.5, 30.0
 STOP_SECONDS = 30.0  # that a job has to end by itself
 LAST_LINES = 8  # of a failed job's output

@@ -48,13 +48,15 @@ class Run:
     @property
     def setting(self) -> str:
         """What is not default in the run, but for what tells replicates apart: runs that agree in it are one row."""
-        return setting(self.config["not_default"])
+        return setting(self.config["not_default"], self.arguments["env_id"])
 
 
-def setting(not_default: dict) -> str:
-    """name=value of the arguments that make a row, "default" if there are none."""
-    items = sorted((name, value) for name, value in not_default.items() if name not in NOT_A_SETTING)
-    return ", ".join(f"{name}={as_text(value)}" for name, value in items) or "default"
+def setting(not_default: dict, env_id: str) -> str:
+    """name=value of the arguments that make a row, "default" if there are none; which single site, makes none."""
+    items = {name: value for name, value in not_default.items() if name not in NOT_A_SETTING}
+    if not_default.get("site_seed") is not None and MODES.get(env_id) != "site-specific":
+        items["site_seed"] = "one"
+    return ", ".join(f"{name}={as_text(value)}" for name, value in sorted(items.items())) or "default"
 
 
 def as_text(value) -> str:

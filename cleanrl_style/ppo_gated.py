@@ -28,7 +28,7 @@ class Args:
     mode: Literal["generalist", "site-specific"] | None = None
     """a new site and weather in every episode, or one fixed site (None: the environment's)"""
     site_seed: int | None = None
-    """another fixed site, in site-specific mode"""
+    """another fixed site in site-specific mode; in generalist mode one site, under new weather in every episode"""
     thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
     """formula of the thaw reward"""
     hide_site: bool = False

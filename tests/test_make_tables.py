@@ -1,4 +1,5 @@
 import shutil
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -6,8 +7,10 @@ import pandas as pd
 import pytest
 from tiny_runs import TINY_RUNS, write_run
 
-from analysis import make_tables
-from analysis.tables import curriculum_selection, physical_conflicts
+from analysis import experiments, make_tables, stored
+from analysis.results import Results
+from analysis.signal_to_noise import CONTRASTS
+from analysis.tables import curriculum_selection, learning_difficulty, physical_conflicts
 
 MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")
 
@@ -81,7 +84,7 @@ def test_season_violations_runtime_details(tables):
 
 
 def test_all_tables_in_all_formats(tables):
-    assert len(make_tables.TABLES) == 10
+    assert len(make_tables.TABLES) == 12
     for module in make_tables.TABLES:
         stem = tables / make_tables.name_of(module)
         rows = len(pd.read_csv(stem.with_suffix(".csv")))
@@ -285,3 +288,29 @@ def test_studies_leave_out_nothing_silently(tmp_path):
     folder = Path(tmp_path)
     make(TINY_RUNS, folder)
     assert "not played yet" in (folder / "physical_conflicts.md").read_text()
+
+
+def test_a_choice_that_all_years_bear_on():
+    years = pd.DataFrame({"year": ["25", "0", "every"], "effect": [-1.0, -1.0, 9.0], "noise": [2.0, 2.0, 9.0]})
+    # effects of 1 to year 25, then falling to 0 at year 50: 38.5 of one year's, and four times that of variance
+    whole = 26 + np.linspace(1, 0, 26)[1:-1].sum()
+    assert learning_difficulty.shared_episodes(years, "noise") == pytest.approx((2 * 1.96) ** 2 * 4 * whole / whole**2)
+
+
+def test_what_learning_is_up_against(tmp_path):
+    names = ("contrast", "objective", "weighting", "year")
+    cases = product(CONTRASTS, ("carbon", "thaw"), ("return", "discounted", "GAE"), ("0", "5", "every"))
+    numbers = {"effect": 1.0, "effect_low": 0.5, "effect_high": 2.0, "carried": 0.25, "site_episodes": 7.0,
+               "site_noise": 1.0, "noise": 2.0, "years_20_50": 0.5}
+    rows = [numbers | dict(zip(names, case, strict=True)) | {"reference": "uniform"} for case in cases]
+    stored.write(tmp_path / "studies" / "signal_to_noise.csv", pd.DataFrame(rows), {})
+    parts = pd.DataFrame({"component": ["site", "policy"] * 2, "objective": ["carbon"] * 2 + ["thaw"] * 2,
+                          "value": "return", "share": [0.4, 0.6, 0.9, 0.1]})
+    stored.write(tmp_path / "variance" / "components.csv", parts, {})
+    results = Results((TINY_RUNS,), experiments.jobs(), tmp_path / "studies")
+    table = learning_difficulty.make(results).set_index(["of", "quantity"])
+    assert table.loc[("variance of returns", "site %"), ["carbon", "thaw"]].tolist() == [40, 90]
+    assert table.loc[("thin", "effect on the return"), ["thaw", "thaw_low", "thaw_high"]].tolist() == [1, 0.5, 2]
+    assert table.loc[("thin", "effect that GAE rewards carry %"), "carbon"] == 25
+    nothing = learning_difficulty.make(Results((TINY_RUNS,), experiments.jobs(), TINY_RUNS / "no studies"))
+    assert all(text.startswith("not there: python analysis/") for text in nothing.quantity)

@@ -338,7 +338,7 @@ def test_learns_the_toy(tmp_path):
     (["--gamma", "1.1"], "--gamma must lie in [0, 1], not 1.1"),
     (["--mode", "site-specific", "--env-id", "boreal-generalist-v0"], "contradicts"),
     (["--mode", "generalist", "--env-id", "boreal_env:boreal-site-specific-v0"], "contradicts"),
-    (["--site-seed", "3"], "--site-seed is for --mode site-specific"),
+    (["--site-seed", "3", "--env-id", "toy_env:toy-v0"], "--site-seed is for boreal-generalist-v0, "),
     (["--thaw-formulation", "contrast", "--env-id", "toy_env:toy-v0"], "not for --env-id toy_env:toy-v0"),
     (["--vectorization", "lockstep", "--env-id", "toy_env:toy-v0"], "no vector entry point"),
     (["--reward-scales", "1", "-1"], "--reward-scales must lie in [0, 1000000], not -1"),

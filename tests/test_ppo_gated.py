@@ -106,3 +106,12 @@ def test_tracking_without_the_package_is_refused(tmp_path, monkeypatch):
     with pytest.raises(SystemExit, match="--track wandb: the package is not installed"):
         run_script("cleanrl_style/ppo_gated.py", "--track", "wandb", "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def test_one_site_under_all_weathers(tmp_path):
+    run_script("cleanrl_style/ppo_gated.py", "--site-seed", 3, "--vectorization", "lockstep", "--num-envs", 2,
+               "--rollout-steps", 100, "--total-timesteps", 100, "--eval-episodes", 2, "--eval-weights", 0.5,
+               "--run-dir", tmp_path / "run")  # fmt: skip
+    for name in ("episodes", "evaluation"):
+        table = pd.read_csv(tmp_path / "run" / f"{name}.csv")
+        assert set(table.site_seed) == {3} and table.thaw_return.nunique() > 1

@@ -14,7 +14,7 @@ from analysis.experiments import Job
 from cleanrl_style.ppo_gated import Args
 
 COUNTS = {"main": 37, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 25, "variants": 27,
-          "mechanisms": 2}
+          "mechanisms": 2, "single": 6, "difficulty": 2}
 
 
 def test_experiments():
@@ -52,9 +52,21 @@ def test_a_variant_knows_its_run():
     protocol.resolve(args)
     config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}
     config = json.loads(json.dumps(config))
-    assert job.made(config) and job.row[2] == runs.setting(config["not_default"])
+    assert job.made(config) and job.row[2] == runs.setting(config["not_default"], args.env_id)
     balanced = boreal_env.Reward().carbon_scale / boreal_env.BALANCED_CARBON_SCALE
     assert experiments.REWARD_SCALES == (pytest.approx(balanced, abs=0.005), 1.0)
+
+
+def test_agents_of_one_site_are_a_row_of_their_own():
+    job = next(job for job in experiments.jobs(["single"], [2]) if job.trains)
+    args = Args(**job.flags)
+    protocol.resolve(args)
+    config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}
+    config = json.loads(json.dumps(config))
+    assert job.made(config) and args.site_seed == experiments.FRONT_SITES[1] and args.mode == "generalist"
+    assert runs.setting(config["not_default"], args.env_id) == job.row[2] and "site_seed=one" in job.row[2]
+    in_one_world = runs.setting({"site_seed": 3}, "boreal-site-specific-v0")
+    assert (in_one_world, runs.setting({"site_seed": 3}, "boreal-generalist-v0")) == ("default", "site_seed=one")
 
 
 def test_every_row_has_its_first_job():
