@@ -184,12 +184,13 @@ def controls(seeds) -> list[Job]:
 
 
 def variants(seeds) -> list[Job]:
-    """Gated PPO with one choice changed, and two of them together; EUPG with other batches, or rewards to come."""
+    """Gated PPO with one choice changed, and those that help thaw together; EUPG with other batches, or rewards to come."""
     changes = (
         ("ppo_gated", {"reward_scales": REWARD_SCALES}),
         ("ppo_gated", {"per_objective_advantages": True}),
         ("ppo_gated", {"ent_coef": 0.0}),
         ("ppo_gated", {"ent_coef": 0.0, "per_objective_advantages": True}),
+        ("ppo_gated", {"ent_coef": 0.0, "per_objective_advantages": True, "gamma": 1.0, "gae_lambda": 1.0}),
         ("ppo_gated", {"hide_site": True}),
         ("ppo_gated", {"learning_rate": 1e-3}),
         ("eupg_var_lambda", {"num_envs": 32}),
