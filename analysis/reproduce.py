@@ -1,4 +1,4 @@
-"""Runs every experiment of the paper (analysis/experiments.py), archives the runs, makes tables, figures and claims.
+"""Runs every experiment of the paper (analysis/experiments.py), archives the runs, makes tables, figures, documents.
 
     python analysis/reproduce.py                     everything, the main table first; the same command goes on
     python analysis/reproduce.py --only main thaw    some of analysis/experiments.py's groups
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Literal
 
 import boreal_env
-from analysis import archive, claims, experiments, make_figures, make_tables, protocol, runs
+from analysis import archive, claims, document_results, experiments, make_figures, make_tables, protocol, runs
 from sim.stands import available_cores
 
 Experiment = Literal["main", "fixed", "site", "thaw", "balanced", "controls", "variants", "mechanisms", "single",
@@ -158,7 +158,7 @@ def finished_configs(*roots: Path) -> list[dict]:
 
 
 def main(args: Args) -> None:
-    """Run what is not finished, archive it, and make tables, figures and the document of the paper's claims."""
+    """Run what is not finished, archive it, and make tables, figures and the documents that show results."""
     seeds = None if args.seeds is None else list(args.seeds)
     jobs = experiments.quick_jobs(args.only) if args.quick else experiments.jobs(args.only, seeds)
     if args.list:
@@ -188,6 +188,8 @@ def main(args: Args) -> None:
     make_tables.main(make_tables.Args(quick=args.quick))
     make_figures.main(make_figures.Args(quick=args.quick))
     claims.main(claims.Args(quick=args.quick))
+    if not args.quick:
+        document_results.main(document_results.Args())
     if failed:
         sys.exit("failed, try the same command again:\n" + "\n".join(f"  {job.command}" for job in failed))
 

@@ -1,6 +1,7 @@
 import re
 import shutil
 from itertools import permutations
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -32,6 +33,7 @@ from analysis.paper_claims.evidence import Evidence
 from analysis.results import Results
 
 GENERALIST = "boreal-generalist-v0"
+ROOT = Path(__file__).parents[1]
 
 
 def results_of(runs, studies=None, jobs=None):
@@ -312,6 +314,12 @@ def test_the_document(tmp_path, capsys):
     lacking = "No runs yet: `python analysis/reproduce.py --only main controls` (python cleanrl_style/ppo_curriculum.py"
     assert f"{lacking} --seed 1 --vectorization lockstep --selector coin is lacking)" in text
     assert "| `main` | 2 | 35 | `constant_plans`" in text
+
+
+def test_the_committed_document_shows_the_committed_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    claims.main(claims.Args(output=tmp_path / "reproduction.md"))
+    assert (tmp_path / "reproduction.md").read_bytes() == (ROOT / "docs/reproduction.md").read_bytes()
 
 
 def test_without_runs_it_says_which_command_makes_them(tmp_path):
