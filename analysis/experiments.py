@@ -184,7 +184,7 @@ def controls(seeds) -> list[Job]:
 
 
 def variants(seeds) -> list[Job]:
-    """Gated PPO with one choice changed, or those that help thaw together; EUPG with other batches, or future rewards."""
+    """Gated PPO with one choice changed, or those that help thaw together; EUPG with other batches, future rewards."""
     changes = (
         ("ppo_gated", {"reward_scales": REWARD_SCALES}),
         ("ppo_gated", {"per_objective_advantages": True}),
