@@ -4,6 +4,8 @@ A pure function of parameters, state, action and the year's random draws, all in
 """
 import math
 
+import numpy as np
+
 from sim.account import clear_year, write_record
 from sim.canopy import aerodynamic_conductance
 from sim.carbon import SECONDS_PER_YEAR, maintenance_rates
@@ -35,16 +37,26 @@ def simulate_year(b, steps_per_day, days, observed, daily):
     """
     begin_year(b)
     seconds = 86400.0 / steps_per_day
+    hours = hour_angles(steps_per_day)
     for day in range(days):
         today = observed[day * steps_per_day : (day + 1) * steps_per_day]
         begin_day(b, day, today)
         for t in range(steps_per_day):
-            angle = 2.0 * math.pi * ((t + 0.5) / steps_per_day - 0.5)
-            cos_hour = math.cos(angle)
+            cos_hour, sin_hour = hours[t, 0], hours[t, 1]
             lit = any_sun(b, t, cos_hour, today)
-            simulate_step(b, t, cos_hour, math.sin(angle), lit, seconds, today)
+            simulate_step(b, t, cos_hour, sin_hour, lit, seconds, today)
         end_day(b, day, steps_per_day, daily)
     end_year(b)
+
+
+@phase
+def hour_angles(steps_per_day):
+    """Cosine and sine of the hour angle at the middle of each step of a day, shape (steps, 2)."""
+    hours = np.empty((steps_per_day, 2))
+    for t in range(steps_per_day):
+        angle = 2.0 * math.pi * ((t + 0.5) / steps_per_day - 0.5)
+        hours[t, 0], hours[t, 1] = math.cos(angle), math.sin(angle)
+    return hours
 
 
 @compiled
