@@ -12,11 +12,11 @@ from sim.carbon import SECONDS_PER_YEAR, maintenance_rates
 from sim.day import begin_day, end_day
 from sim.demography import OLDEST, count, grow_older, kill, recruits, self_thinning
 from sim.disturbance import between, disturb
-from sim.jit import compiled, phase
+from sim.jit import phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
 from sim.snow import LATENT_HEAT_FUSION, ground_profile
 from sim.soil import organic_layer
-from sim.step import simulate_step
+from sim.step import simulate_step, step_weather
 from sim.structure import crown_areas
 from sim.weather import DAYS_PER_YEAR
 
@@ -42,9 +42,8 @@ def simulate_year(b, steps_per_day, days, observed, daily):
         today = observed[day * steps_per_day : (day + 1) * steps_per_day]
         begin_day(b, day, today)
         for t in range(steps_per_day):
-            cos_hour, sin_hour = hours[t, 0], hours[t, 1]
-            lit = any_sun(b, t, cos_hour, today)
-            simulate_step(b, t, cos_hour, sin_hour, lit, seconds, today)
+            step_weather(b, t, hours, seconds, today)
+            simulate_step(b, seconds)
         end_day(b, day, steps_per_day, daily)
     end_year(b)
 
@@ -57,17 +56,6 @@ def hour_angles(steps_per_day):
         angle = 2.0 * math.pi * ((t + 0.5) / steps_per_day - 0.5)
         hours[t, 0], hours[t, 1] = math.cos(angle), math.sin(angle)
     return hours
-
-
-@compiled
-def any_sun(b, t, cos_hour, observed):
-    """Whether the sun, or observed shortwave, reaches any lane."""
-    for i in range(len(b.s.swe)):
-        if b.w.sun_a[i] + b.w.sun_b[i] * cos_hour > 0.0:
-            return True
-        if observed.shape[0] > 0 and observed[t, 3, i] > 0.0:
-            return True
-    return False
 
 
 @phase
