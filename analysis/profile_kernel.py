@@ -8,7 +8,6 @@ its fields in the nearest cache, and what the compiler shares between phases is 
 phase by phase, which takes half a minute.
 """
 
-import math
 import statistics
 import time
 from dataclasses import dataclass
@@ -27,7 +26,7 @@ from sim.day import begin_day, end_day
 from sim.draws import draw_year
 from sim.jit import OPTIONS
 from sim.state import DAILY, DRAWS_SIZE, STATE_SIZE, block_dtype
-from sim.year import any_sun, begin_year
+from sim.year import begin_year, hour_angles
 
 STEPS_PER_DAY = 48
 SECONDS = 86400.0 / STEPS_PER_DAY
@@ -43,10 +42,10 @@ CALLS = 400
 #: The phases of a step in their order: name -> (function, arguments after the block). The canopy is solved together
 #: with the conductances it starts from, which are taken off again.
 PHASES = {
-    "generated_air": (step.generated_air, "cos_hour, sin_hour, SECONDS"),
+    "step_weather": (step.step_weather, "t, hours, SECONDS, observed"),
     "stores_before": (step.stores_before, "SECONDS"),
-    "any_sun": (any_sun, "t, cos_hour, observed"),
-    "sunlight": (arrival.sunlight, "t, cos_hour, SECONDS, observed"),
+    "any_sun": (arrival.any_sun, ""),
+    "sunlight": (arrival.sunlight, ""),
     "darkness": (arrival.darkness, ""),
     "any_snow": (arrival.any_snow, ""),
     "snowfall": (arrival.snowfall, "SECONDS"),
@@ -58,7 +57,7 @@ PHASES = {
     "move_carbon": (transfer.move_carbon, "SECONDS"),
     "balance": (step.balance, "SECONDS"),
 }
-WHOLE = (step.simulate_step, "t, cos_hour, sin_hour, cos_hour > -0.9, SECONDS, observed")
+WHOLE = [PHASES["step_weather"], (step.simulate_step, "SECONDS")]
 DAYS = {"begin_day": (begin_day, "day, observed"), "end_day": (end_day, "day, 48, daily")}  # once a day
 
 
@@ -75,10 +74,10 @@ class Args:
 
 
 def repeated(*calls: tuple):
-    """A compiled function (blocks, number, day, t, cos_hour, sin_hour, observed, daily) that makes the calls."""
+    """A compiled function (blocks, number, day, t, hours, observed, daily) that makes the calls."""
     names = {f"phase_{k}": function for k, (function, _) in enumerate(calls)}
     lines = [f"        phase_{k}({', '.join(filter(None, ['block', given]))})" for k, (_, given) in enumerate(calls)]
-    source = "def run(blocks, number, day, t, cos_hour, sin_hour, observed, daily):\n"
+    source = "def run(blocks, number, day, t, hours, observed, daily):\n"
     source += "    for k in range(number):\n        block = blocks[k % len(blocks)]\n" + "\n".join(lines)
     namespace = {**names, "SECONDS": SECONDS}
     exec(source, namespace)
@@ -91,7 +90,7 @@ def nothing(lanes: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def blocks_at(moments: dict, lanes: int) -> dict[str, tuple]:
-    """Sampled stands at the start of a step: name of the moment -> (block, day, t, cos_hour, sin_hour)."""
+    """Sampled stands at the start of a step: name of the moment -> (block, day, t, hours)."""
     stands = started(lanes, threads=1)
     generator = np.random.default_rng(0)
     draws = np.array([draw_year(generator, generator) for _ in range(lanes)])
@@ -102,17 +101,16 @@ def blocks_at(moments: dict, lanes: int) -> dict[str, tuple]:
     rows[first : first + STATE_SIZE] = stands.state.T
     rows[first + STATE_SIZE : first + STATE_SIZE + DRAWS_SIZE] = draws.T
     block, (observed, daily) = blocks[0], nothing(lanes)
+    hours = hour_angles(STEPS_PER_DAY)
     begin_year(block)
     found = {}
     for day in range(1 + max(day for day, _ in moments.values())):
         begin_day(block, day, observed)
         for t in range(STEPS_PER_DAY):
-            angle = 2.0 * math.pi * ((t + 0.5) / STEPS_PER_DAY - 0.5)
-            cos_hour, sin_hour = math.cos(angle), math.sin(angle)
-            now = blocks.copy(), day, t, cos_hour, sin_hour
+            now = blocks.copy(), day, t, hours
             found |= {name: now for name, moment in moments.items() if moment == (day, t)}
-            lit = any_sun(block, t, cos_hour, observed)
-            step.simulate_step(block, t, cos_hour, sin_hour, lit, SECONDS, observed)
+            step.step_weather(block, t, hours, SECONDS, observed)
+            step.simulate_step(block, SECONDS)
         end_day(block, day, STEPS_PER_DAY, daily)
     return found
 
@@ -134,7 +132,8 @@ def time_calls(function, blocks: np.ndarray, now: tuple, repeats: int) -> float:
 def where_time_goes(lanes: int = LANES, repeats: int = 15) -> pd.DataFrame:
     """Time of a step [ns per stand]: a row a phase, then their sum, the whole step, and what is done once a day, as
     its part of a step; a column a moment."""
-    functions = {name: repeated(phase) for name, phase in {**PHASES, "whole step": WHOLE, **DAYS}.items()}
+    functions = {name: repeated(phase) for name, phase in {**PHASES, **DAYS}.items()}
+    functions["whole step"] = repeated(*WHOLE)
     functions["solve_canopy"] = repeated(PHASES["conductances"], PHASES["solve_canopy"])
     table = pd.DataFrame(0.0, index=[*PHASES, "sum", "whole step", *DAYS], columns=list(MOMENTS))
     for moment, (blocks, *now) in blocks_at(MOMENTS, lanes).items():
@@ -142,12 +141,14 @@ def where_time_goes(lanes: int = LANES, repeats: int = 15) -> pd.DataFrame:
         for name in DAYS:
             table.loc[name, moment] = time_calls(functions[name], blocks, now, repeats) / STEPS_PER_DAY
         observed, daily = nothing(lanes)
-        left_out = ["darkness" if any_sun(blocks[0], *now[1:3], observed) else "sunlight"]
+        left_out = []
         for name in PHASES:
             if name in left_out:
                 continue
             table.loc[name, moment] = time_calls(functions[name], blocks, now, repeats)
             functions[name](blocks, 1, *now, observed, daily)
+            if name == "any_sun":
+                left_out.append("darkness" if arrival.any_sun(blocks[0]) else "sunlight")
             if name == "any_snow":
                 left_out.append("no_snow" if arrival.any_snow(blocks[0]) else "snowfall")
         table.loc["solve_canopy", moment] -= table.loc["conductances", moment]

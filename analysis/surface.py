@@ -5,7 +5,6 @@ twice as well as thawed: what is to feel the same surface as the simulator's soi
 """
 
 import functools
-import math
 
 import numpy as np
 
@@ -15,8 +14,8 @@ from sim.jit import phase, specialised
 from sim.management import decode
 from sim.spin_up import climate_draws
 from sim.state import DAILY, DAYS, DRAWS, block_dtype
-from sim.step import simulate_step
-from sim.year import any_sun, begin_year, end_year
+from sim.step import simulate_step, step_weather
+from sim.year import begin_year, end_year, hour_angles
 
 NO_CHANGE = 12
 
@@ -27,13 +26,12 @@ def record_year(b, steps_per_day, no_weather, no_daily, surface):
     of the ground [degC] and resistance of the snow [m2 K W-1] at each step's end."""
     begin_year(b)
     seconds = 86400.0 / steps_per_day
+    hours = hour_angles(steps_per_day)
     for day in range(DAYS):
         begin_day(b, day, no_weather)
         for t in range(steps_per_day):
-            angle = 2.0 * math.pi * ((t + 0.5) / steps_per_day - 0.5)
-            cos_hour = math.cos(angle)
-            lit = any_sun(b, t, cos_hour, no_weather)
-            simulate_step(b, t, cos_hour, math.sin(angle), lit, seconds, no_weather)
+            step_weather(b, t, hours, seconds, no_weather)
+            simulate_step(b, seconds)
             for i in range(len(b.s.swe)):
                 surface[0, day * steps_per_day + t, i] = b.s.ground[i]
                 surface[1, day * steps_per_day + t, i] = b.s.swe[i] * b.w.snow_resistance[i]

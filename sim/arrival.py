@@ -18,18 +18,20 @@ PSYCHROMETRIC_OVER_ICE = PSYCHROMETRIC_PER_HPA * LATENT_HEAT_VAPORISATION / LATE
 
 
 @compiled
-def sunlight(b, t, cos_hour, seconds, observed):
+def any_sun(b):
+    """Whether shortwave reaches any lane."""
+    for i in range(len(b.s.swe)):
+        if b.w.shortwave[i] > 0.0:
+            return True
+    return False
+
+
+@compiled
+def sunlight(b):
     """Shortwave absorbed by canopy and ground, and photosynthesis."""
     s, p, w = b.s, b.p, b.w
-    if observed.shape[0] > 0:
-        for i in range(len(s.swe)):
-            w.shortwave[i] = observed[t, 3, i]
-    else:
-        for i in range(len(s.swe)):
-            w.shortwave[i] = w.top_of_canopy[i] * max(w.sun_a[i] + w.sun_b[i] * cos_hour, 0.0)
     for i in range(len(s.swe)):
-        cos_zenith = max(w.sun_a[i] + w.sun_b[i] * cos_hour, 0.0)
-        path = path_length(cos_zenith, p.slant_path[i], p.slant_path_max[i])
+        path = path_length(w.cos_zenith[i], p.slant_path[i], p.slant_path_max[i])
         beam_conifer, beam_deciduous = canopy_interception(
             path, w.crown_area[i], w.share_conifer[i], w.optical_conifer[i], w.optical_deciduous[i]
         )
@@ -63,7 +65,6 @@ def darkness(b):
     """The same at night."""
     w = b.w
     for i in range(len(b.s.swe)):
-        w.shortwave[i] = 0.0
         w.canopy_sw[i] = 0.0
         w.ground_sw[i] = 0.0
         w.reflected[i] = 0.0

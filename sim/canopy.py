@@ -75,7 +75,8 @@ def canopy_balance(
     ground_kelvin = ground + FREEZING_POINT_K
     ground_slope = black_body_slope(ground_kelvin)
 
-    free_ground = ground_base + ground_by_emission * emission + ground_by_canopy * canopy
+    # In all sums here what is known last is added last: a single stand waits for each addition.
+    free_ground = ground_base + ground_by_canopy * canopy + ground_by_emission * emission
     # Below 0 degC, at 0 degC while snow melts, above it when the last snow has melted within the step.
     new_ground = min(free_ground, 0.0) + bare_gain * max(free_ground - melt_span, 0.0)
     gain = 1.0 if free_ground <= 0.0 else (bare_gain if free_ground >= melt_span else 0.0)
@@ -86,7 +87,7 @@ def canopy_balance(
         longwave_down(sky, emission, cover),
         ground_emissivity,
     )
-    net = shortwave_absorbed + cover * (sky + up - 2.0 * emission)
+    net = shortwave_absorbed + cover * (sky - 2.0 * emission + up)
 
     available = max(net - fixed, 0.0)
     wet = wet_coefficient * available
@@ -94,7 +95,7 @@ def canopy_balance(
     used += wet_coefficient if net > fixed and wet < wet_limit else 0.0
 
     latent = dry_coefficient * available + min(wet, wet_limit)
-    residual = net - air_conductance * (canopy - air) - latent - fixed - trunk_conductance * (canopy - trunk)
+    residual = net - fixed - air_conductance * (canopy - air) - trunk_conductance * (canopy - trunk) - latent
     # Warmer ground gives the canopy longwave, and heat by the trunk.
     from_ground = ground_emissivity * ground_slope * cover * (1.0 - used) + trunk_conductance * trunk_by_ground
     reflected = (1.0 - ground_emissivity) * cover

@@ -65,10 +65,11 @@ def longwave_up(ground_emission, below_canopy, emissivity) -> float:
 @compiled
 def black_body(kelvin: float) -> float:
     """Stefan-Boltzmann emission [W m-2]."""
-    return STEFAN_BOLTZMANN * kelvin * kelvin * kelvin * kelvin
+    square = kelvin * kelvin
+    return STEFAN_BOLTZMANN * square * square
 
 
 @compiled
 def black_body_slope(kelvin: float) -> float:
     """Its derivative [W m-2 K-1]."""
-    return 4.0 * STEFAN_BOLTZMANN * kelvin * kelvin * kelvin
+    return 4.0 * STEFAN_BOLTZMANN * kelvin * (kelvin * kelvin)

@@ -139,7 +139,7 @@ FORCING = (
 _WORK = """
 above_deep_node advected air air_density air_emission air_sum amplitude anomaly bare_gain biomass_before
 boundary_before boundary_conductance canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum canopy_sw
-cos_latitude cos_peak cos_warmest cover_conifer cover_deciduous crown_area deep deep_base deep_by_surface
+cos_latitude cos_peak cos_warmest cos_zenith cover_conifer cover_deciduous crown_area deep deep_base deep_by_surface
 deep_conductance deep_frozen deep_latent deep_sum deep_thawed deficit density_change diffuse dry_coefficient
 dryness_conifer dryness_deciduous emissivity energy_before energy_gain et_before extraterrestrial first_cut_age fixed
 frozen_ratio gpp_before gpp_conifer gpp_deciduous ground_base ground_by_canopy ground_by_emission ground_conductance
@@ -152,10 +152,10 @@ residual rh_before runoff_before saturation_slope sensible_before share_conifer 
 sin_peak sin_warmest sky sky_conifer sky_deciduous snow snow_area snow_density snow_efficiency snow_hiding snow_log
 snow_resistance snow_wind soil_before soil_heat_sum soil_rate soil_top stems_before stems_gain summer_down summer_up
 sun_a sun_b surface surface_base surface_by_ground surface_conductance surface_frozen surface_latent surface_sum
-surface_thawed sw_before temperature_stress_conifer temperature_stress_deciduous thaw_seconds thaw_warmth
-top_of_canopy top_sum transpiration_conifer transpiration_deciduous trial trunk_air trunk_base trunk_by_canopy
-trunk_by_ground trunk_canopy trunk_ground unloading_rate upper_soil vapour vapour_density water_before water_gain
-water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
+surface_thawed sw_before temperature_stress_conifer temperature_stress_deciduous thaw_seconds thaw_warmth top_of_canopy
+top_sum transpiration_conifer transpiration_deciduous trial trunk_air trunk_base trunk_by_canopy trunk_by_ground
+trunk_canopy trunk_ground unloading_rate upper_soil vapour vapour_density water_before water_gain water_stress
+wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
 """.split()
 
 

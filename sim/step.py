@@ -3,7 +3,7 @@
 Fluxes are computed once, at the temperatures of an implicit step, and then moved between stores. `balance` checks from
 the stores alone that nothing was lost.
 """
-from sim.arrival import any_snow, darkness, no_snow, rainfall, snowfall, sunlight
+from sim.arrival import any_snow, any_sun, darkness, no_snow, rainfall, snowfall, sunlight
 from sim.day import wind_exchange
 from sim.jit import compiled
 from sim.radiation import black_body
@@ -15,19 +15,11 @@ from sim.weather import FREEZING_POINT_K, saturation_pressure, saturation_pressu
 
 
 @compiled
-def simulate_step(b, t, cos_hour, sin_hour, sun_up, seconds, observed):
-    """Advance a block by one step of `seconds`.
-
-    t : number of the step in its day; cos_hour, sin_hour : of the hour angle at the middle of the step; sun_up :
-    whether any lane may have sun; observed : the day's forcing (steps, 6, lanes), or (0, 6, lanes) for none.
-    """
-    if observed.shape[0] > 0:
-        observed_air(b, observed[t])
-    else:
-        generated_air(b, cos_hour, sin_hour, seconds)
+def simulate_step(b, seconds):
+    """Advance a block by one step of `seconds`, in the weather that `step_weather` has left in it."""
     stores_before(b, seconds)
-    if sun_up:
-        sunlight(b, t, cos_hour, seconds, observed)
+    if any_sun(b):
+        sunlight(b)
     else:
         darkness(b)
     if any_snow(b):
@@ -43,10 +35,25 @@ def simulate_step(b, t, cos_hour, sin_hour, sun_up, seconds, observed):
 
 
 @compiled
+def step_weather(b, t, hours, seconds, observed):
+    """Weather of a step. It is apart from the step because it alone takes arrays, whose references are counted.
+
+    t : number of the step in its day; hours : cosine and sine of the hour angle at the middle of each step of a day,
+    shape (steps, 2); observed : the day's forcing (steps, 6, lanes), or (0, 6, lanes) for none.
+    """
+    if observed.shape[0] > 0:
+        observed_air(b, observed[t], hours[t, 0])
+    else:
+        generated_air(b, hours[t, 0], hours[t, 1], seconds)
+
+
+@compiled
 def generated_air(b, cos_hour, sin_hour, seconds):
-    """Air temperature, longwave and precipitation of the step, from the day's generated weather."""
+    """Sun, air temperature, longwave and precipitation of the step, from the day's generated weather."""
     w = b.w
     for i in range(len(b.s.swe)):
+        w.cos_zenith[i] = max(w.sun_a[i] + w.sun_b[i] * cos_hour, 0.0)
+        w.shortwave[i] = w.top_of_canopy[i] * w.cos_zenith[i]
         w.air[i] = w.mean_temperature[i] + w.amplitude[i] * (cos_hour * w.cos_peak[i] + sin_hour * w.sin_peak[i])
         w.air_emission[i] = black_body(w.air[i] + FREEZING_POINT_K)
         w.sky[i] = w.emissivity[i] * w.air_emission[i]
@@ -54,10 +61,12 @@ def generated_air(b, cos_hour, sin_hour, seconds):
 
 
 @compiled
-def observed_air(b, row):
+def observed_air(b, row, cos_hour):
     """The same from observation; row : (6, lanes), columns as in `sim.state.FORCING`."""
     w = b.w
     for i in range(len(b.s.swe)):
+        w.cos_zenith[i] = max(w.sun_a[i] + w.sun_b[i] * cos_hour, 0.0)
+        w.shortwave[i] = row[3, i]
         w.air[i] = row[0, i]
         w.vapour[i] = row[1, i] * saturation_pressure_water(row[0, i])
         w.air_emission[i] = black_body(row[0, i] + FREEZING_POINT_K)

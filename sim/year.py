@@ -4,17 +4,19 @@ A pure function of parameters, state, action and the year's random draws, all in
 """
 import math
 
+import numpy as np
+
 from sim.account import clear_year, write_record
 from sim.canopy import aerodynamic_conductance
 from sim.carbon import SECONDS_PER_YEAR, maintenance_rates
 from sim.day import begin_day, end_day
 from sim.demography import OLDEST, count, grow_older, kill, recruits, self_thinning
 from sim.disturbance import between, disturb
-from sim.jit import compiled, phase
+from sim.jit import phase
 from sim.management import conifers_to_cut, cut_oldest, feasible_change
 from sim.snow import LATENT_HEAT_FUSION, ground_profile
 from sim.soil import organic_layer
-from sim.step import simulate_step
+from sim.step import simulate_step, step_weather
 from sim.structure import crown_areas
 from sim.weather import DAYS_PER_YEAR
 
@@ -35,27 +37,25 @@ def simulate_year(b, steps_per_day, days, observed, daily):
     """
     begin_year(b)
     seconds = 86400.0 / steps_per_day
+    hours = hour_angles(steps_per_day)
     for day in range(days):
         today = observed[day * steps_per_day : (day + 1) * steps_per_day]
         begin_day(b, day, today)
         for t in range(steps_per_day):
-            angle = 2.0 * math.pi * ((t + 0.5) / steps_per_day - 0.5)
-            cos_hour = math.cos(angle)
-            lit = any_sun(b, t, cos_hour, today)
-            simulate_step(b, t, cos_hour, math.sin(angle), lit, seconds, today)
+            step_weather(b, t, hours, seconds, today)
+            simulate_step(b, seconds)
         end_day(b, day, steps_per_day, daily)
     end_year(b)
 
 
-@compiled
-def any_sun(b, t, cos_hour, observed):
-    """Whether the sun, or observed shortwave, reaches any lane."""
-    for i in range(len(b.s.swe)):
-        if b.w.sun_a[i] + b.w.sun_b[i] * cos_hour > 0.0:
-            return True
-        if observed.shape[0] > 0 and observed[t, 3, i] > 0.0:
-            return True
-    return False
+@phase
+def hour_angles(steps_per_day):
+    """Cosine and sine of the hour angle at the middle of each step of a day, shape (steps, 2)."""
+    hours = np.empty((steps_per_day, 2))
+    for t in range(steps_per_day):
+        angle = 2.0 * math.pi * ((t + 0.5) / steps_per_day - 0.5)
+        hours[t, 0], hours[t, 1] = math.cos(angle), math.sin(angle)
+    return hours
 
 
 @phase

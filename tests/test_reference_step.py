@@ -31,8 +31,8 @@ from sim.demography import AGES
 from sim.jit import uncompiled
 from sim.parameters import CONSTANTS, MECHANISMS, ORDERED_CONSTANTS, SITE_PARAMETERS
 from sim.state import DAILY, DAYS, DRAWS, FORCING, RECORD, STATE, block_dtype
-from sim.step import simulate_step
-from sim.year import any_sun, begin_year
+from sim.step import simulate_step, step_weather
+from sim.year import begin_year, hour_angles
 
 AGREEMENT = 1e-10  # of the natural scale
 STEPS = 2  # from each drawn state
@@ -53,8 +53,9 @@ KINDS = {
 # The kernel stops at a residual of 1e-7 W m-2: enough for budgets, not for ten digits of a thin canopy's temperature.
 with pytest.MonkeyPatch.context() as patch:
     patch.setattr(sim.solve, "NEWTON_TOLERANCE", 1e-10)
-    begin_year, begin_day, any_sun, clear_day, simulate_step, write_day = (
-        uncompiled(phase) for phase in (begin_year, begin_day, any_sun, clear_day, simulate_step, write_day)
+    begin_year, begin_day, hour_angles, clear_day, step_weather, simulate_step, write_day = (
+        uncompiled(phase)
+        for phase in (begin_year, begin_day, hour_angles, clear_day, step_weather, simulate_step, write_day)
     )
 
 
@@ -175,10 +176,10 @@ def kernel_step(b, step, steps_per_day, forcing):
     """Take one step with the kernel: what it adds to the record, and its row of daily output, by name."""
     record = {name: float(getattr(b.r, name)[0]) for name in RECORD}
     row = np.zeros((len(DAILY), 1))
-    angle = 2.0 * math.pi * ((step + 0.5) / steps_per_day - 0.5)
+    seconds = 86400.0 / steps_per_day
     clear_day(b)
-    lit = any_sun(b, step, math.cos(angle), forcing)
-    simulate_step(b, step, math.cos(angle), math.sin(angle), lit, 86400.0 / steps_per_day, forcing)
+    step_weather(b, step, hour_angles(steps_per_day), seconds, forcing)
+    simulate_step(b, seconds)
     write_day(b, 1, row)
     daily = dict(zip(DAILY, row[:, 0].tolist(), strict=True))
     means = {name for name in record if name.endswith("_temperature_c")}  # filled at the day's end
