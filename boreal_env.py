@@ -197,7 +197,7 @@ def valid_actions(density: np.ndarray, harvestable: np.ndarray) -> np.ndarray:
 
 
 #: Carbon scale [kgC m-2 yr-1] at which both returns vary equally between policies of one site, as measured by
-#: `analysis/measure_balance.py`.
+#: `analysis/studies/measure_balance.py`.
 BALANCED_CARBON_SCALE = 1.4
 ROUND_OFF_STEMS = 1e-6  # stems ha-1; planting up to the limit reaches it but for less
 

@@ -1,1 +1,1 @@
-"""Evaluation protocol, metrics and tables of the benchmark."""
+"""Evaluation protocol, metrics, studies, validation, tables and figures of the benchmark."""

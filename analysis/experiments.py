@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from analysis.evaluation import MODES
+from analysis.protocol.evaluation import MODES
 from analysis.runs import setting
 
 ROOT = Path(__file__).parents[1]
@@ -18,8 +18,8 @@ SITE_SEEDS = (1, 2, 3, 4, 5)
 # of weak wind, where planting costs it and thinning does not.
 FRONT_SITES = (3_000_000_078, 3_000_000_210, 3_000_000_058)
 GENERALIST_STEPS, SITE_SPECIFIC_STEPS = 300_000, 100_000
-# analysis/measure_balance.py: both returns vary equally between policies at a carbon scale of 1.4 kgC m-2 yr-1; the
-# paper's rewards are at 2.0, so the carbon reward times 2.0 / 1.4
+# analysis/studies/measure_balance.py: both returns vary equally between policies at a carbon scale of 1.4 kgC m-2 yr-1;
+# the paper's rewards are at 2.0, so the carbon reward times 2.0 / 1.4
 REWARD_SCALES = (1.43, 1.0)
 
 EXPERIMENTS = {
@@ -47,7 +47,7 @@ class Job:
     @property
     def path(self) -> str:
         """The script's file, relative to the repository."""
-        folder = "analysis" if self.is_study else "cleanrl_style" if self.trains else "baselines_heuristic"
+        folder = "analysis/studies" if self.is_study else "cleanrl_style" if self.trains else "baselines_heuristic"
         return f"{folder}/{self.script}.py"
 
     @property

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis import experiments, metrics, runs, stored
+from analysis import experiments, metrics, runs
+from analysis.studies import stored
 
 STUDIES_DIR = Path("results/studies")
 QUICK_STUDIES_DIR = Path("results/quick/studies")

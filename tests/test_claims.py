@@ -8,9 +8,7 @@ import pandas as pd
 import pytest
 from tiny_runs import TINY_RUNS, write_run
 
-from analysis import claims, experiments, stored
-from analysis.constant_plans import PLANTING
-from analysis.mechanism_pairs import MEANS, PAIRS
+from analysis import claims, experiments
 from analysis.paper_claims import asymmetry, curriculum, environment, paper_itself, performance, preference, speed
 from analysis.paper_claims.claim import (
     CONTRADICTS,
@@ -31,6 +29,9 @@ from analysis.paper_claims.claim import (
 )
 from analysis.paper_claims.evidence import Evidence
 from analysis.results import Results
+from analysis.studies import stored
+from analysis.studies.constant_plans import PLANTING
+from analysis.studies.mechanism_pairs import MEANS, PAIRS
 
 GENERALIST = "boreal-generalist-v0"
 ROOT = Path(__file__).parents[1]
@@ -127,7 +128,7 @@ def test_one_seed_is_no_verdict():
     assert finding.verdict == UNDECIDED
     assert ours["scalarised return"].value == pytest.approx(5 / 3) and ours["scalarised return"].count == 1
     assert ours["the same less zero change, same episodes"].value == pytest.approx(5 / 3)  # (1 + 1 + 3) / 3
-    assert ours["share of the site in the variance of thaw returns (`analysis/variance.py`)"] == "no runs yet"
+    assert ours["share of the site in the variance of thaw returns (`analysis/studies/variance.py`)"] == "no runs yet"
     finding, ours = found(preference.curriculum_follows, TINY_RUNS)
     assert [ours[f"{name} return, weight 1 less weight 0"].value for name in ("carbon", "thaw")] == [2, -2]
 

@@ -10,9 +10,10 @@ from tiny_runs import write_run
 
 import boreal_env
 import sim
-from analysis import distance_to_best, experiments, open_loop, stored
-from analysis.distance_to_best import BEST_OF_ALL, BEST_OF_SITE, GAINS
+from analysis import experiments
 from analysis.results import Results
+from analysis.studies import distance_to_best, open_loop, stored
+from analysis.studies.distance_to_best import BEST_OF_ALL, BEST_OF_SITE, GAINS
 from analysis.tables import distance_to_best as share_table
 
 SITES = (open_loop.FIRST_SITE_SEED + 3, open_loop.FIRST_SITE_SEED + 8)
@@ -227,7 +228,7 @@ def test_refusals(fronts_dir, calls, tmp_path, monkeypatch):
         evaluate(tmp_path / "runs", calls)
     evaluate(tmp_path / "runs", calls, overwrite=True)
     monkeypatch.setattr(distance_to_best.open_loop, "fingerprint", lambda: "another")
-    with pytest.raises(SystemExit, match="of another physics; `python analysis/fronts.py`"):
+    with pytest.raises(SystemExit, match="of another physics; `python analysis/studies/fronts.py`"):
         evaluate(tmp_path / "runs", calls)
     monkeypatch.setattr(distance_to_best, "FRONTS_DIR", tmp_path / "nowhere")
     with pytest.raises(SystemExit, match="no fronts in"):

@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 from scripts import run_script
 
-from analysis import draw_conflict, fronts, nsga2, open_loop, stored
+from analysis.studies import draw_conflict, fronts, nsga2, open_loop, stored
 
 TINY = nsga2.Budget(population=8, generations=2, weathers=1, report_weathers=2)
 
@@ -119,12 +119,12 @@ def test_a_finished_front_is_not_searched_again(tmp_path, monkeypatch, capsys):
 
 def test_refusals(capsys):
     with pytest.raises(SystemExit, match="--sites 0: 1 to 400 are"):
-        run_script("analysis/fronts.py", "--sites", 0)
+        run_script("analysis/studies/fronts.py", "--sites", 0)
 
 
 def test_figure(tmp_path):
     args = draw_conflict.Args(results=tmp_path, path=tmp_path / "conflict.png")
-    with pytest.raises(SystemExit, match="python analysis/fronts.py makes it"):
+    with pytest.raises(SystemExit, match="python analysis/studies/fronts.py makes it"):
         draw_conflict.main(args)
     summary = pd.DataFrame([
         {"site_seed": 7, "off": off, "boundary_above_air_k": 3, "snow_mm_day": 1, **fronts.summarise(hand_case())}

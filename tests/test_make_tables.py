@@ -7,12 +7,21 @@ import pandas as pd
 import pytest
 from tiny_runs import TINY_RUNS, write_run
 
-from analysis import experiments, make_tables, stored
+from analysis import experiments, make_tables, results
 from analysis.results import Results
-from analysis.signal_to_noise import CONTRASTS
+from analysis.studies import stored
+from analysis.studies.signal_to_noise import CONTRASTS
 from analysis.tables import curriculum_selection, learning_difficulty, physical_conflicts
 
 MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_studies(tmp_path_factory):
+    """The project's own studies are not the tests'."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "STUDIES_DIR", tmp_path_factory.mktemp("no studies"))
+        yield
 
 
 def make(runs, folder):
@@ -188,7 +197,7 @@ def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):
     assert "no run yet" in (tmp_path / "tables" / "main_results.md").read_text()
     assert "python cleanrl_style/ppo_curriculum.py --seed 1 --vectorization lockstep\n" in out
     assert "python baselines_heuristic/zero_change.py\n" not in out
-    assert "python analysis/mechanism_pairs.py\n" in out
+    assert "python analysis/studies/mechanism_pairs.py\n" in out
 
 
 def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):

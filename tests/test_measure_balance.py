@@ -1,6 +1,6 @@
 import numpy as np
 
-from analysis import measure_balance
+from analysis.studies import measure_balance
 
 
 def test_the_measured_scale_equalises_the_spreads(capsys):

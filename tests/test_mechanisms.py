@@ -3,8 +3,8 @@ import pandas as pd
 import pytest
 from scripts import run_script
 
-from analysis import constant_plans, mechanism_pairs, site_warming, stored
-from analysis.evaluation import EVAL_WEIGHTS
+from analysis.protocol.evaluation import EVAL_WEIGHTS
+from analysis.studies import constant_plans, mechanism_pairs, site_warming, stored
 
 
 def test_a_pair_differs_in_its_one_thing(monkeypatch):
@@ -56,4 +56,4 @@ def test_a_study_is_made_once(tmp_path, monkeypatch, capsys):
 def test_site_warming_needs_the_curriculum(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit, match="ppo_curriculum.py --seed 1"):
-        run_script("analysis/site_warming.py")
+        run_script("analysis/studies/site_warming.py")

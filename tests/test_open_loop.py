@@ -3,7 +3,7 @@ import pytest
 
 import boreal_env
 import sim
-from analysis import open_loop
+from analysis.studies import open_loop
 
 
 def test_play_gives_the_environments_returns_and_replaces_what_cannot_be_done():

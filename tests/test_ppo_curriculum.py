@@ -13,7 +13,8 @@ from scripts import ROOT, run_script
 from toy_env import optimal_return
 
 import boreal_env
-from analysis import protocol, run_folder
+from analysis import protocol
+from analysis.protocol import run_folder
 from cleanrl_style.ppo_curriculum import Agent, Args, Curriculum, compute_gae, weigh_advantages
 
 SCRIPT = "cleanrl_style/ppo_curriculum.py"

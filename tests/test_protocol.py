@@ -7,8 +7,9 @@ import pytest
 from scripts import run_script
 from toy_env import LENGTH, optimal_return
 
-from analysis import evaluation, protocol
-from analysis.progress import Progress
+from analysis import protocol
+from analysis.protocol import evaluation
+from analysis.protocol.progress import Progress
 
 
 @dataclass

@@ -6,7 +6,7 @@ import pytest
 from scripts import run_script
 
 import sim
-from analysis import open_loop, sensitivity
+from analysis.studies import open_loop, sensitivity
 from sim.parameters import check_constants, check_mechanisms, check_overrides
 
 
@@ -123,4 +123,4 @@ def test_a_stopped_study_goes_on_with_the_groups_that_are_left(tmp_path, monkeyp
 
 def test_refusals():
     with pytest.raises(SystemExit, match="--names nonsense"):
-        run_script("analysis/sensitivity.py", "--names", "nonsense")
+        run_script("analysis/studies/sensitivity.py", "--names", "nonsense")

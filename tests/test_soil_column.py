@@ -8,10 +8,10 @@ from pytest import approx
 from scripts import run_script
 
 import sim
-from analysis import soil_column
-from analysis.conduction import Column, Grid, Ground, Surface, layer_mean, spun_up, thawed_depth
-from analysis.soil_column import LAYER_EDGES_M, SCHEMES, layers_to
-from analysis.surface import record_year
+from analysis.validation import soil_column
+from analysis.validation.conduction import Column, Grid, Ground, Surface, layer_mean, spun_up, thawed_depth
+from analysis.validation.soil_column import LAYER_EDGES_M, SCHEMES, layers_to
+from analysis.validation.surface import record_year
 from sim.block import namespace
 from sim.jit import uncompiled
 from sim.parameters import check_constants, check_mechanisms
@@ -146,4 +146,4 @@ def test_grids_reach_the_boundary():
 @pytest.mark.parametrize("flag", [("--sites", 0), ("--years", 0), ("--first-site", -1)])
 def test_bad_arguments_are_named(flag):
     with pytest.raises(SystemExit, match="are allowed"):
-        run_script("analysis/soil_column.py", *flag)
+        run_script("analysis/validation/soil_column.py", *flag)

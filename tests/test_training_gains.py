@@ -5,7 +5,8 @@ import pytest
 from tiny_runs import TINY_RUNS
 
 import boreal_env
-from analysis import protocol, runs, training_gains
+from analysis import protocol, runs
+from analysis.studies import training_gains
 
 YEARS = boreal_env.DEFAULT_YEARS
 

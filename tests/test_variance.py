@@ -4,7 +4,7 @@ import pytest
 from scripts import run_script
 
 import sim
-from analysis import open_loop, stored, variance
+from analysis.studies import open_loop, stored, variance
 
 SITE = open_loop.FIRST_SITE_SEED + 2
 
@@ -69,4 +69,4 @@ def test_a_tiny_design(tmp_path, monkeypatch):
 
 def test_refusals():
     with pytest.raises(SystemExit, match="--sites >= 4"):
-        run_script("analysis/variance.py", "--sites", 1)
+        run_script("analysis/studies/variance.py", "--sites", 1)

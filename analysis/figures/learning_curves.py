@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from analysis import constant_plans, metrics
+from analysis import metrics
 from analysis.experiments import HEURISTICS, METHODS
 from analysis.figures.common import COLOURS, SEEDS_95, STEPS, band, finish, learning_curve, methods, no_data, panels
 from analysis.results import TITLES
-from analysis.training_gains import gains
+from analysis.studies import constant_plans
+from analysis.studies.training_gains import gains
 
 SIZE = (7.2, 4.8)
 PARTS = 20  # of the training; fewer than of a learning curve, as a part of the episodes has a gain
@@ -28,7 +29,7 @@ def draw(figure, results) -> None:
             gain_curve(axes[3 + k], results.of("main", script), nothing, f"{name}_gain", COLOURS[script])
         for ax, kind in ((axes[k], "return"), (axes[3 + k], "gain")):
             if kind == "gain" and nothing is None:
-                no_data(ax, "python analysis/training_gains.py")
+                no_data(ax, "python analysis/studies/training_gains.py")
                 continue
             for label, colour, values in levels:
                 if f"{name}_{kind}" in values:

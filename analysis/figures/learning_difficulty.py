@@ -4,8 +4,8 @@ comes."""
 import numpy as np
 
 from analysis.figures.common import finish, no_data, panels
-from analysis.open_loop import OBJECTIVES
-from analysis.signal_to_noise import CONTRASTS, UNIFORM, WEIGHTINGS
+from analysis.studies.open_loop import OBJECTIVES
+from analysis.studies.signal_to_noise import CONTRASTS, UNIFORM, WEIGHTINGS
 from analysis.tables.learning_difficulty import YEAR, variance_components
 
 SIZE = (7, 5.8)
@@ -30,7 +30,7 @@ def draw(figure, results) -> None:
     table, years = results.study("signal_to_noise"), results.study("signal_to_noise_years")
     if table is None or years is None:
         for ax in (noise, course, needed):
-            no_data(ax, "python analysis/signal_to_noise.py")
+            no_data(ax, "python analysis/studies/signal_to_noise.py")
         return
     cases = table[(table.reference == UNIFORM) & (table.year == YEAR)].set_index(["weighting", "contrast", "objective"])
     draw_noise(noise, cases.loc["return"])
@@ -41,7 +41,7 @@ def draw(figure, results) -> None:
 def draw_variance(ax, components) -> None:
     """Stacked shares of the variance of returns and of one year's rewards."""
     if components is None:
-        no_data(ax, "python analysis/variance.py")
+        no_data(ax, "python analysis/studies/variance.py")
         return
     shares = components.set_index(["value", "objective", "component"]).share
     bars = [("return", "carbon"), ("return", "thaw"), ("one year", "carbon"), ("one year", "thaw")]

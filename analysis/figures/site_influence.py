@@ -1,8 +1,8 @@
 """How far the site decides about thaw, and how much the returns of training episodes scatter for it."""
 
 import sim
-from analysis import open_loop
 from analysis.figures.common import COLOURS, MARKERS, SEEDS_95, STEPS, finish, learning_curve, methods, panels
+from analysis.studies import open_loop
 
 SIZE = (7, 3)
 CAPTION = f"(a) evaluation, a point a site, mean over weights and seeds. (b) {SEEDS_95}."

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.constant_plans import as_evaluation
 from analysis.paper_claims.claim import Missing, Number, Row, about, above, all_of, below, claim, finding, within
 from analysis.paper_claims.evidence import VARIANCE, difference, first_and_last, mean_of, only, seeds
+from analysis.studies.constant_plans import as_evaluation
 from analysis.tables.common import GENERALIST
 
 TITLE = "Learning one objective at a time"

@@ -5,16 +5,17 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis import metrics, stored
+from analysis import metrics
 from analysis.experiments import Job
 from analysis.figures.common import binned
 from analysis.paper_claims.claim import SEEDS, Missing, Number
 from analysis.results import Replicate, Results
+from analysis.studies import stored
 from analysis.tables.common import over_seeds
 from analysis.tables.main_results import run_metrics
 
 PAPER_ALONE = ""
-VARIANCE, FRONTS = "python analysis/variance.py", "python analysis/fronts.py"
+VARIANCE, FRONTS = "python analysis/studies/variance.py", "python analysis/studies/fronts.py"
 BENCHMARK, PROFILE = "python analysis/benchmark.py", "python analysis/profile_kernel.py"
 PARTS = 10  # of a training; its first and its last are compared
 
@@ -106,7 +107,7 @@ class Evidence:
         """A study's table."""
         table = self.results.study(name)
         if table is None:
-            raise Missing(f"analysis/{name}.py")
+            raise Missing(f"analysis/studies/{name}.py")
         return table
 
     def beside(self, name: str, read: Callable[[Path], pd.DataFrame] = stored.read) -> pd.DataFrame:

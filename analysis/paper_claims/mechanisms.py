@@ -2,16 +2,16 @@
 
 import pandas as pd
 
-from analysis.mechanism_pairs import PAIRS
 from analysis.paper_claims.claim import Missing, Number, Row, about, above, all_of, below, claim, finding, short, within
 from analysis.paper_claims.evidence import FRONTS, difference, mean_of, only, optional, seeds
+from analysis.studies.mechanism_pairs import PAIRS
 from analysis.tables.common import mean_of_years, paper
 from analysis.tables.growing_season_correlations import SEASON_PAIRS, correlations
 from analysis.tables.thaw_formulations import replicates_of, run_numbers
 
 TITLE = "Physics and mechanisms"
 THAW, MAIN = only("main", "thaw"), only("main")
-STUDY = "python analysis/mechanism_pairs.py"
+STUDY = "python analysis/studies/mechanism_pairs.py"
 
 
 def formulation(evidence, name: str, function) -> pd.DataFrame:

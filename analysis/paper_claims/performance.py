@@ -37,7 +37,7 @@ def value_claim(script: str):
         gain = optional(lambda: seeds(evidence.metric("gain_scalarized", "main", script)))
         rows = [Row("scalarised return", short(papers), ours),
                 Row("the same less zero change, same episodes", "", gain),
-                Row("share of the site in the variance of thaw returns (`analysis/variance.py`)", "",
+                Row("share of the site in the variance of thaw returns (`analysis/studies/variance.py`)", "",
                     optional(lambda: share(evidence, "thaw", "site")))]
         return finding(rows, about(ours, papers))
 
@@ -181,7 +181,7 @@ def curriculum_scatters_less(evidence):
     rows = [Row(f"standard deviation over episodes, {TITLES[script]}", f"{published(script).scalarized_std:g}",
                 seeds(scatter[script])) for script in scatter]
     rows.append(Row("Curriculum over Gated", "0.5", ratio))
-    rows.append(Row("share of the site in the variance of thaw returns (`analysis/variance.py`)", "",
+    rows.append(Row("share of the site in the variance of thaw returns (`analysis/studies/variance.py`)", "",
                     optional(lambda: share(evidence, "thaw", "site"))))
     return finding(rows, below(ratio, 0.75, what="the ratio"))
 

@@ -1,13 +1,13 @@
 """How near agents and fixed strategies come to the best known plans of the sites of the fronts.
 
-From analysis/distance_to_best.py; docs/learning.md says how to read it.
+From analysis/studies/distance_to_best.py; docs/learning.md says how to read it.
 """
 
 import pandas as pd
 
-from analysis import stored
-from analysis.distance_to_best import TEXT
 from analysis.experiments import WEIGHTS
+from analysis.studies import stored
+from analysis.studies.distance_to_best import TEXT
 from analysis.tables.common import ROW_COLUMNS, over_seeds
 
 TITLE = "Distance to the best known plans"

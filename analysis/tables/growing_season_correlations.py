@@ -1,7 +1,7 @@
 """Growing season against thaw return, latent heat and shortwave on the ground: correlations, and pairs of stands.
 
 The correlations are over evaluation episodes and weights, as the paper's: sites differ in everything at once. The
-pairs (analysis/mechanism_pairs.py) differ in the season alone.
+pairs (analysis/studies/mechanism_pairs.py) differ in the season alone.
 """
 
 import pandas as pd

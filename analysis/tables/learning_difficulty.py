@@ -1,14 +1,14 @@
 """Why thaw is harder to learn than carbon: what the returns vary with, and the effect of an action against the noise.
 
-From analysis/variance.py and analysis/signal_to_noise.py; docs/learning.md defines every row.
+From analysis/studies/variance.py and analysis/studies/signal_to_noise.py; docs/learning.md defines every row.
 """
 
 import numpy as np
 import pandas as pd
 
-from analysis import stored
-from analysis.open_loop import OBJECTIVES
-from analysis.signal_to_noise import CONTRASTS, EVERY, UNIFORM, YEARS, episodes_needed
+from analysis.studies import stored
+from analysis.studies.open_loop import OBJECTIVES
+from analysis.studies.signal_to_noise import CONTRASTS, EVERY, UNIFORM, YEARS, episodes_needed
 
 TITLE = "Difficulty of learning"
 COLUMNS = {"of": "of", "quantity": "quantity", "carbon": "carbon", "thaw": "thaw"}
@@ -37,7 +37,7 @@ SHARED = {
 
 
 def variance_components(results) -> pd.DataFrame | None:
-    """The table of analysis/variance.py, None if it has not been made."""
+    """The table of analysis/studies/variance.py, None if it has not been made."""
     path = results.studies_dir.parent / "variance" / "components.csv"
     return stored.read(path) if path.exists() else None
 
@@ -74,7 +74,7 @@ def make(results) -> pd.DataFrame:
     components = variance_components(results)
     for value, title in VALUES.items():
         if components is None:
-            rows.append({"of": title, "quantity": "not there: python analysis/variance.py"})
+            rows.append({"of": title, "quantity": "not there: python analysis/studies/variance.py"})
             continue
         of_value = components[components.value == value]
         for component in dict.fromkeys(of_value.component):
@@ -83,7 +83,7 @@ def make(results) -> pd.DataFrame:
     table = results.study("signal_to_noise")
     for contrast in CONTRASTS:
         if table is None:
-            rows.append({"of": contrast, "quantity": "not there: python analysis/signal_to_noise.py"})
+            rows.append({"of": contrast, "quantity": "not there: python analysis/studies/signal_to_noise.py"})
             continue
         case = table[(table.reference == UNIFORM) & (table.contrast == contrast) & (table.year == YEAR)]
         for quantity, (weighting, column, factor) in EFFECTS.items():

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.constant_plans import as_evaluation
-from analysis.evaluation import EVAL_WEIGHTS
+from analysis.protocol.evaluation import EVAL_WEIGHTS
 from analysis.results import METHODS
+from analysis.studies.constant_plans import as_evaluation
 from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Main results"

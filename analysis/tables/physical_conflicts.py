@@ -1,10 +1,10 @@
-"""What one change of a stand does to both objectives on the same sites and weathers (analysis/mechanism_pairs.py)."""
+"""What one change of a stand does to both objectives, all else equal (analysis/studies/mechanism_pairs.py)."""
 
 import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.mechanism_pairs import PAIRS
+from analysis.studies.mechanism_pairs import PAIRS
 from analysis.tables.common import paper
 
 TITLE = "Physical conflicts"

@@ -21,9 +21,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from analysis import tracking, training_envs
-from analysis.arguments import FREE_ARGUMENTS, fail, not_default
-from analysis.summary import draw_summary, print_table
+from analysis.protocol import tracking, training_envs
+from analysis.protocol.arguments import FREE_ARGUMENTS, fail, not_default
+from analysis.protocol.summary import draw_summary, print_table
 
 try:
     import fcntl
@@ -333,7 +333,7 @@ def versions() -> dict:
 
 def commit() -> str | None:
     """The git commit of this checkout; None outside a checkout."""
-    root = Path(__file__).parents[1]
+    root = Path(__file__).parents[2]
     if not (root / ".git").exists():
         return None
     try:

@@ -1,6 +1,6 @@
 """Draws where the two objectives conflict: docs/images/conflict.png.
 
-    python analysis/draw_conflict.py
+    python analysis/studies/draw_conflict.py
 
 from the tables of `fronts.py`, `fronts.py --without-mechanisms` and `variance.py`.
 """
@@ -13,8 +13,9 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from analysis import open_loop, protocol, stored
-from analysis.fronts import ALL_ON, GAINS, YEARS, path_of, plan_means, with_gains
+from analysis import protocol
+from analysis.studies import open_loop, stored
+from analysis.studies.fronts import ALL_ON, GAINS, YEARS, path_of, plan_means, with_gains
 
 MADE_BY = {"fronts": "fronts.py", "fronts/mechanisms": "fronts.py --without-mechanisms", "variance": "variance.py"}
 COLUMNS = 4
@@ -35,7 +36,7 @@ def read(folder: Path, name: str, text: tuple[str, ...] = ()) -> pd.DataFrame:
     path = folder / name
     if not path.exists():
         command = MADE_BY[next(key for key in sorted(MADE_BY, reverse=True) if folder.as_posix().endswith(key))]
-        sys.exit(f"draw_conflict.py: {path} is missing; python analysis/{command} makes it")
+        sys.exit(f"draw_conflict.py: {path} is missing; python analysis/studies/{command} makes it")
     return stored.read(path, text)
 
 

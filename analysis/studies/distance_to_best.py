@@ -1,6 +1,6 @@
-"""How near each method comes to the best known plans of the twelve sites of analysis/fronts.py, site by site.
+"""How near each method comes to the best known plans of the twelve sites of analysis/studies/fronts.py, site by site.
 
-    python analysis/distance_to_best.py [--runs-dir runs]
+    python analysis/studies/distance_to_best.py [--runs-dir runs]
 
 Trained agents (finished runs with their checkpoint) and fixed strategies play the sites, weathers and first stands on
 which the plans of results/fronts are reported; what counts are gains over zero change on the same site and weather.
@@ -22,7 +22,9 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import evaluation, experiments, metrics, open_loop, protocol, results, runs, stored
+from analysis import experiments, metrics, protocol, results, runs
+from analysis.protocol import evaluation
+from analysis.studies import open_loop, stored
 
 FRONTS_DIR = Path("results/fronts")
 WEIGHTS = experiments.WEIGHTS
@@ -68,11 +70,11 @@ def read_plans(folder: Path, physics: str, sites=None, weathers: int | None = No
         if sites is not None and site not in sites:
             continue
         if made_by["physics"] != physics:
-            sys.exit(f"error: {path} is of another physics; `python analysis/fronts.py` makes it anew")
+            sys.exit(f"error: {path} is of another physics; `python analysis/studies/fronts.py` makes it anew")
         table = stored.read(path, text=("actions",))
         plans[site] = with_gains(table[table.weather.isin(sorted(set(table.weather))[:weathers])])
     if not plans:
-        sys.exit(f"error: no fronts in {folder}; `python analysis/fronts.py` makes them")
+        sys.exit(f"error: no fronts in {folder}; `python analysis/studies/fronts.py` makes them")
     return plans
 
 

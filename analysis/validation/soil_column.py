@@ -1,7 +1,7 @@
 """Is the simulator's ground fine enough? Its two soil nodes beside a column of 30 layers, its step of 30 minutes
 beside others, and its boundary at other depths.
 
-    python analysis/soil_column.py
+    python analysis/validation/soil_column.py
 
 Stands of several sites live under three policies. In every step each scheme below sees the surface that the
 simulator's soil sees, and conducts heat down to the boundary with the simulator's freezing curve, conductivities and
@@ -20,8 +20,8 @@ import pandas as pd
 import boreal_env
 import sim
 from analysis import protocol
-from analysis.conduction import Column, Grid, Ground, Surface, layer_mean, spun_up, thawed_depth
-from analysis.surface import RecordedStands
+from analysis.validation.conduction import Column, Grid, Ground, Surface, layer_mean, spun_up, thawed_depth
+from analysis.validation.surface import RecordedStands
 from sim.parameters import CONSTANTS
 from sim.stands import available_cores
 from sim.state import DAILY, DAYS, PARAMETER_NAMES, STATE_NAMES

@@ -1,6 +1,6 @@
 """Pairs of stands that differ in one thing, on the same sites and weathers: what it does to both objectives.
 
-    python analysis/mechanism_pairs.py
+    python analysis/studies/mechanism_pairs.py
 
 Where the paper correlates across sites, which differ in everything at once, here all but one thing is equal. Stands
 begin with 1000 stems/ha, half of them conifers, and are left alone for 50 years, except in the pairs of planting.
@@ -14,7 +14,8 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import open_loop, protocol, results, stored
+from analysis import protocol, results
+from analysis.studies import open_loop, stored
 
 YEARS = 50
 STAND = {"density_stems_ha": 1000.0, "conifer_fraction": 0.5, "biomass_kgc_m2": 5.0, "soil_kgc_m2": 6.0,

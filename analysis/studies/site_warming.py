@@ -1,6 +1,6 @@
 """How far the sites that the curriculum accepted and rejected would warm if nothing were done there.
 
-    python analysis/site_warming.py
+    python analysis/studies/site_warming.py
 
 Reads the training episodes of the curriculum's runs, draws some of both kinds from each run, and leaves their sites
 alone for 50 years. Leaves results/studies/site_warming.csv, one row a drawn episode.
@@ -14,7 +14,8 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import open_loop, protocol, results, stored
+from analysis import protocol, results
+from analysis.studies import open_loop, stored
 
 YEARS = 50
 EACH = 60  # episodes of each kind and run

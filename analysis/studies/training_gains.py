@@ -1,6 +1,6 @@
 """Returns of doing nothing on the episodes that agents train on, so that learning curves can show gains.
 
-    python analysis/training_gains.py
+    python analysis/studies/training_gains.py
 
 A training episode's return is mostly its site's and weather's; less that of zero change on the same site and weather
 it is the policy's. Runs with the same seed and number of environments train on the same episodes; of these every
@@ -17,7 +17,8 @@ import numpy as np
 import pandas as pd
 
 import boreal_env
-from analysis import experiments, open_loop, protocol, results, stored
+from analysis import experiments, protocol, results
+from analysis.studies import open_loop, stored
 
 EVERY = 8
 STREAM = ["num_envs", "seed"]  # what fixes the episodes of a training in generalist mode

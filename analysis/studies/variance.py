@@ -1,6 +1,6 @@
 """Splits the variance of both returns, and of one year's rewards, into site, weather and policy.
 
-    python analysis/variance.py
+    python analysis/studies/variance.py
 
 Every site is played under every weather and every policy (a balanced, crossed design), so the analysis of variance has
 all interactions, and what is left for the last, site x weather x policy, is no error: the simulator has none. Sites
@@ -17,7 +17,8 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import open_loop, protocol, stored
+from analysis import protocol
+from analysis.studies import open_loop, stored
 
 YEARS = 50
 FACTORS = ("site", "weather", "policy")

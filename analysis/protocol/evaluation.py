@@ -8,7 +8,7 @@ import pandas as pd
 
 import boreal_env
 from analysis.metrics import scalarize
-from analysis.progress import Progress
+from analysis.protocol.progress import Progress
 
 # The mode of each id of this benchmark; any other id is a user's own environment.
 MODES = {

@@ -13,7 +13,7 @@ import numpy as np
 
 import boreal_env
 from analysis import protocol
-from analysis.evaluation import final_info
+from analysis.protocol.evaluation import final_info
 from baselines_heuristic import conifer_restoration, plus_100, target_density, zero_change
 
 FIRST_SEED = 2_000_000_000  # met neither in training nor in evaluation

@@ -1,6 +1,6 @@
 """Evaluates constant plans under the protocol: what a method that looks at nothing already has.
 
-    python analysis/constant_plans.py
+    python analysis/studies/constant_plans.py
 
 Planting 50 or 100 stems/ha a year at each of the five mixes wherever there is room, on the evaluation's episodes.
 Leaves results/studies/constant_plans.csv, one row an episode.
@@ -13,8 +13,9 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import open_loop, protocol, results, stored
-from analysis.measure_balance import where_valid
+from analysis import protocol, results
+from analysis.studies import open_loop, stored
+from analysis.studies.measure_balance import where_valid
 
 ENVIRONMENTS = ("boreal-generalist-v0", "boreal-balanced-v0")
 PLANTING = tuple(range(15, 25))  # +50 and +100, five mixes each

@@ -9,7 +9,7 @@ import gymnasium as gym
 import tyro
 
 import boreal_env
-from analysis.evaluation import FIRST_EVALUATION_SEED, MODES
+from analysis.protocol.evaluation import FIRST_EVALUATION_SEED, MODES
 
 MAX_ENVS = 1000
 # Arguments that change nothing in what a run computes.

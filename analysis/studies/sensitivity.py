@@ -1,7 +1,7 @@
 """What the results hang on: every site parameter at the ends of its range, every literature constant +-10 %.
 
-    python analysis/sensitivity.py                       # all, into results/sensitivity and docs/sensitivity.md
-    python analysis/sensitivity.py --names light_use_conifer max_lai_conifer   # these only, printed
+    python analysis/studies/sensitivity.py                       # all, into results/sensitivity and docs/sensitivity.md
+    python analysis/studies/sensitivity.py --names light_use_conifer max_lai_conifer   # these only, printed
 
 One at a time, on the same sites, starts and weathers, under four plans: zero change, and planting 100 stems a year of
 conifers, of deciduous trees, of half each. A group of parameters is one table; a command that was stopped goes on
@@ -18,7 +18,8 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import open_loop, protocol, stored
+from analysis import protocol
+from analysis.studies import open_loop, stored
 from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.stands import available_cores
 
@@ -223,10 +224,11 @@ def page(table: pd.DataFrame) -> str:
     defaults = "\n".join(f"| `{name}` | {meaning} | {default[name]:+.2f} |" for name, meaning in MEASURES.items())
     return f"""# What the results hang on
 
-Written by `python analysis/sensitivity.py`; not to be edited. Every site parameter at the low and the high end of its
-sampled range, and every literature constant {SHARE:.0%} below and above its value, one at a time: 50-year returns on
-{SITES} sites that span what is sampled (weathers on each: {WEATHERS}), everything else held, the dice included. The
-sites start with their own stands. Planting is 100 stems/ha a year wherever that can be done. What was measured:
+Written by `python analysis/studies/sensitivity.py`; not to be edited. Every site parameter at the low and the high end
+of its sampled range, and every literature constant {SHARE:.0%} below and above its value, one at a time:
+50-year returns on {SITES} sites that span what is sampled (weathers on each: {WEATHERS}), everything else held,
+the dice included. The sites start with their own stands. Planting is 100 stems/ha a year wherever that can be
+done. What was measured:
 
 | | | at the default |
 |---|---|---|

@@ -1,6 +1,6 @@
 """How well one action can be told from another: its effect on each return, against the noise a policy gradient sees.
 
-    python analysis/signal_to_noise.py
+    python analysis/studies/signal_to_noise.py
 
 In one year of an episode a stand takes one of two actions; site, past, coming weather and all later dice of the policy
 are the same in both. The difference of what follows is the action's effect, free of noise but for what differs between
@@ -18,7 +18,8 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import open_loop, protocol, results, stored
+from analysis import protocol, results
+from analysis.studies import open_loop, stored
 
 YEARS = 50
 CHUNK = 128  # stands in lockstep

@@ -8,7 +8,7 @@ from functools import partial
 
 import gymnasium as gym
 
-from analysis.evaluation import MODES
+from analysis.protocol.evaluation import MODES
 
 
 class InWorker(gym.Wrapper):

@@ -1,7 +1,7 @@
 """How far the two objectives pull apart, site by site: fronts of non-dominated plans, found by NSGA-II.
 
-    python analysis/fronts.py                        # 12 sites that span the ranges
-    python analysis/fronts.py --without-mechanisms   # 3 typical ones, each mechanism of the physics off in turn
+    python analysis/studies/fronts.py                        # 12 sites that span the ranges
+    python analysis/studies/fronts.py --without-mechanisms   # 3 typical ones, each mechanism of the physics off in turn
 
 A plan is an action for every block of five years. It is sought on four weathers and reported on sixteen others, as
 returns and as gains: the return less that of zero change on the same weather. Needs `pip install -e ".[analysis]"`.
@@ -17,9 +17,10 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import nsga2, open_loop, protocol, stored
+from analysis import protocol
 from analysis.metrics import hypervolume
-from analysis.nsga2 import Budget
+from analysis.studies import nsga2, open_loop, stored
+from analysis.studies.nsga2 import Budget
 
 YEARS = 50
 BLOCK_YEARS = 5
