@@ -42,6 +42,7 @@ ROLLOUT = 2048  # steps of a training between two updates
 #: Our figure -> the paper's, a row of its table of running times.
 PAPER = {
     "50-year episode, 1 stand": "episode_50_years_numba",
+    "50-year episode, python backend": "episode_50_years_pure_python",
     "async worker": "memory_per_env",
     "async, 300,000 steps with evaluation": "training_generalist_300k_steps",
 }
@@ -100,15 +101,25 @@ def counted(number: int, noun: str) -> str:
 
 
 def episode(args: Args, stack: ExitStack) -> list[Measurement]:
-    """An episode with its spin-up, per stand, on one core (processor time)."""
+    """An episode with its spin-up, per stand, on one core (processor time); of the interpreted source only the
+    year's first days, times the number that the years have."""
     years = 10 if args.quick else 50
+    days = 2 if args.quick else 5
+    interpreted = sim.Stands(1, backend="python")
+    interpreted.set_state(started(1).get_state())
 
     def measure(stands):
         work = seconds(lambda: (start(stands), simulate(stands, years)), clock=time.process_time)
         each = "" if stands.number == 1 else " in lockstep, each"
         return {(f"{years}-year episode, {counted(stands.number, 'stand')}{each}", "s"): work / stands.number}
 
-    return [partial(measure, sim.Stands(n, threads=1)) for n in (1, 16, 32, 64)[: 2 if args.quick else None]]
+    def measure_interpreted():
+        nothing = np.full(1, boreal_env.NO_CHANGE)
+        work = seconds(interpreted.step, nothing, days=days, clock=time.process_time)
+        return {(f"{years}-year episode, python backend", "s"): work * years * DAYS / days}
+
+    numbers = (1, 16, 32, 64)[: 2 if args.quick else None]
+    return [*(partial(measure, sim.Stands(n, threads=1)) for n in numbers), measure_interpreted]
 
 
 def per_step(stands: sim.Stands) -> float:
