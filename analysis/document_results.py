@@ -49,8 +49,8 @@ def numbers(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
     return row if gains is None else row | main_results.front_metrics(gains, "gain_")
 
 
-def line(title: str, evaluations: list, published: float = np.nan) -> str:
-    """A row of the table: interquartile means over seeds with 95 % intervals, and the paper's scalarised return."""
+def line(title: str, evaluations: list, published: float = np.nan, trained: bool = False) -> str:
+    """A row of the table: interquartile means over training seeds with 95 % intervals, and the paper's return."""
     table = pd.DataFrame([numbers(*one) for one in evaluations], columns=COLUMNS)
     values, cells = over_seeds(table), []
     for name in COLUMNS:
@@ -58,7 +58,8 @@ def line(title: str, evaluations: list, published: float = np.nan) -> str:
         interval = "" if np.isnan(low) else f" [{low:.2f}, {high:.2f}]"
         cells.append("" if np.isnan(value) else f"{value:.2f}{interval}")
     cells.append("" if np.isnan(published) else f"{published:.2f}")
-    return f"| {title} | {len(table)} | " + " | ".join(cells) + " |\n"
+    seeds = str(len(table)) if trained else ""
+    return f"| {title} | {seeds} | " + " | ".join(cells) + " |\n"
 
 
 def flags(setting: str) -> str:
@@ -71,8 +72,8 @@ def flags(setting: str) -> str:
     return f"`{' '.join(words)}`" if words else ""
 
 
-def rows_of(results: Results, script: str, environment: str | None = None) -> list[tuple[str, list, float]]:
-    """(flags, evaluations with gains, the paper's return) of a script's rows that have runs, the default first."""
+def rows_of(results: Results, script: str, environment: str | None = None) -> list[tuple]:
+    """`line`'s arguments, the title being the flags, for a script's rows that have runs, the default first."""
     published = main_results.paper_rows().paper_scalarized
     found = [(key, [(one.evaluation, one.gains) for one in replicates]) for key, replicates in results.rows.items()
              if key[0] == script and replicates and environment in (None, key[1])]  # fmt: skip
@@ -81,7 +82,7 @@ def rows_of(results: Results, script: str, environment: str | None = None) -> li
         parts = [flags(setting), "" if env_id in (GENERALIST, environment) else f"`{env_id}`"]
         title = ", ".join(filter(None, parts)) or "default"
         papers = published.get(METHODS[script], np.nan) if title == "default" else np.nan
-        titled.append((title, evaluations, papers))
+        titled.append((title, evaluations, papers, script in experiments.TRAINED))
     return sorted(titled, key=lambda row: row[0] != "default")
 
 

@@ -42,5 +42,5 @@ def draw(figure, results) -> None:
                 evaluation.plot(row.p50, height, "|", color=COLOURS[script], markersize=4)
                 title, height = None, height - 1
         height -= 2
-    evaluation.set_yticks([])
     finish(evaluation, xlabel="conifer fraction after 50 years", xlim=(0, 1))
+    evaluation.set_yticks([])

@@ -12,8 +12,9 @@ from analysis.studies.training_gains import gains
 SIZE = (7.2, 4.8)
 PARTS = 20  # of the training; fewer than of a learning curve, as a part of the episodes has a gain
 CAPTION = ("Sums over 50 years: (a-c) returns of training episodes, (d-f) less those of zero change on the same "
-           f"episodes; {SEEDS_95}. Dashed: fixed strategies in the evaluation, mean over weights; the best constant "
-           "plan is that of each weight.")  # fmt: skip
+           f"episodes; {SEEDS_95}. Dashed, dotted: fixed strategies in the evaluation, mean over weights; the best "
+           "constant plan is that of each weight.")  # fmt: skip
+BEST = "Best constant plan"
 QUANTITIES = {"carbon": "carbon", "thaw": "thaw", "scalarized": "scalarised"}
 
 
@@ -33,7 +34,8 @@ def draw(figure, results) -> None:
                 continue
             for label, colour, values in levels:
                 if f"{name}_{kind}" in values:
-                    ax.axhline(values[f"{name}_{kind}"], color=colour, linestyle="--", linewidth=0.8, label=label)
+                    style = ":" if label == BEST else "--"
+                    ax.axhline(values[f"{name}_{kind}"], color=colour, linestyle=style, linewidth=0.9, label=label)
             finish(ax, legend=False, ylabel=f"{QUANTITIES[name]} {kind}", **STEPS)
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
@@ -67,7 +69,7 @@ def baselines(results) -> list[tuple]:
         env_id = results.first_job("main", METHODS[0]).env_id
         weights = sorted(evaluated[0][2].preference.unique())
         best = constant_plans.as_evaluation(plans[plans.env_id == env_id], weights, best=True)
-        evaluated.append(("Best constant plan", "#444444", best))
+        evaluated.append((BEST, "#000000", best))
     zero = next((evaluation for title, _, evaluation in evaluated if title == TITLES["zero_change"]), None)
     for title, colour, evaluation in evaluated:
         values = level(evaluation, "return")
