@@ -48,10 +48,10 @@ def run_block(
     forcing = np.zeros((0, 6, lanes)) if observed is None else np.repeat(observed[:, :, None], lanes, axis=2)
     output = np.zeros((0 if daily is None else days, len(DAILY), lanes))
     if backend == "numba":
-        kernel(lanes)(block[0], steps_per_day, days, forcing, output)
+        kernel(lanes)(block, steps_per_day, days, forcing, output)
     else:
         with np.errstate(all="ignore"):
-            interpreted()(namespace(block[0]), steps_per_day, days, forcing, output)
+            interpreted()([namespace(block[0])], steps_per_day, days, forcing, output)
     if daily is not None:
         daily[:] = output[:, :, :number].transpose(2, 0, 1)
     first = parameters.shape[1]
@@ -82,5 +82,5 @@ def interpreted():
 def compile_kernels(number: int) -> None:
     """Have the kernels ready that so many stands need, so that processes forked later find them."""
     for lanes in sorted({LANES if b.stop - b.start > 1 else 1 for b in blocks(number)}):
-        block = np.zeros(1, block_dtype(lanes))[0]
+        block = np.zeros(1, block_dtype(lanes))
         kernel(lanes)(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes)))
