@@ -3,6 +3,7 @@
 Stands are rows of arrays, (stands, fields); a block has them as lanes of `sim.state.block_dtype`.
 """
 import functools
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype
 from sim.year import simulate_year
 
 LANES = 16
+CACHE_LINE = 64  # bytes
 BACKENDS = ("numba", "python")
 
 
@@ -34,7 +36,7 @@ def run_block(
     """
     number = len(parameters)
     lanes = LANES if number > 1 else 1
-    rows = np.zeros((block_dtype(lanes).itemsize // (8 * lanes), lanes))
+    rows = aligned_zeros((block_dtype(lanes).itemsize // (8 * lanes), lanes))
     block = np.ndarray(1, block_dtype(lanes), buffer=rows)
     fill = np.minimum(np.arange(lanes), number - 1)
     first = 0
@@ -58,6 +60,14 @@ def run_block(
     new_state = rows[first : first + STATE_SIZE, :number].T
     record = rows[first + STATE_SIZE + DRAWS_SIZE :][: len(RECORD), :number].T
     return new_state, record
+
+
+def aligned_zeros(shape) -> np.ndarray:
+    """Zeros from a cache line's beginning on: vectors that lie across two lines make lockstep a tenth slower."""
+    size = 8 * math.prod(shape)
+    memory = np.zeros(size + CACHE_LINE, dtype=np.uint8)
+    first = -memory.__array_interface__["data"][0] % CACHE_LINE
+    return memory[first : first + size].view(float).reshape(shape)
 
 
 def namespace(record):

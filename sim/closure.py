@@ -14,7 +14,6 @@ TOLERANCES = {
     "stems_residual_ha": 1e-9,
 }
 _COLUMNS = [RECORD_NAMES.index(name) for name in TOLERANCES]
-_LIMITS = np.array(list(TOLERANCES.values()))
 _STEMS, _DENSITY = list(TOLERANCES).index("stems_residual_ha"), RECORD_NAMES.index("density_stems_ha")
 
 
@@ -28,7 +27,7 @@ def check_closure(state, record, parameters, describe) -> None:
     state, record, parameters : (stands, fields) each; describe : function of a row that says which year of which stand.
     """
     residuals = record[:, _COLUMNS]
-    limits = np.tile(_LIMITS, (len(record), 1))
+    limits = np.tile(list(TOLERANCES.values()), (len(record), 1))
     limits[:, _STEMS] *= 1.0 + record[:, _DENSITY]
     closed = residuals <= limits
     finite = np.isfinite(state)
