@@ -26,6 +26,7 @@ from sim.management import (
     NEGLIGIBLE_STEMS,
     NUM_ACTIONS,
     check_actions,
+    decode,
 )
 from sim.parameters import check_overrides, check_seed
 from sim.spin_up import check_initial_ranges
@@ -133,6 +134,7 @@ _RECORDED = {
     18: "soil_change_kgc_m2", 19: "net_carbon_change_kgc_m2", 20: "mortality_kgc_m2", 21: "litterfall_kgc_m2",
     22: "harvest_kgc_m2", 23: "hwp_stored_kgc_m2",
 }  # fmt: skip
+_RECORDED_ENTRIES, _RECORDED_COLUMNS = np.array([(i, _COLUMN[name]) for i, name in _RECORDED.items()]).T
 
 
 def observation_space(entries: Sequence[int], largest_penalties: Sequence[float] = (0.0, 0.0, 0.0)) -> Box:
@@ -257,20 +259,24 @@ def reward_components(record: np.ndarray, density_change: np.ndarray, reward: Re
     record : annual records (n, columns of `sim.RECORD_NAMES`); density_change : what was asked for [stems ha-1].
     The change and the bonuses are clipped; `components_clipped` is what that cut off, all three together.
     """
-    column = {name: record[:, i] for name, i in _COLUMN.items()}
-    change = column["net_carbon_change_kgc_m2"] / reward.carbon_scale
-    stock = (column["biomass_kgc_m2"] + column["soil_kgc_m2"]) / reward.stock_scale
-    products = column["hwp_stored_kgc_m2"] / reward.product_scale
+
+    def column(name):
+        return record[:, _COLUMN[name]]
+
+    biomass, soil = column("biomass_kgc_m2"), column("soil_kgc_m2")
+    change = column("net_carbon_change_kgc_m2") / reward.carbon_scale
+    stock = (biomass + soil) / reward.stock_scale
+    products = column("hwp_stored_kgc_m2") / reward.product_scale
     gains = {
         "carbon_change": np.clip(change, -1.0, 1.0),
         "stock_bonus": reward.stock_bonus * np.clip(stock, 0.0, 1.0),
         "product_bonus": reward.product_bonus * np.clip(products, 0.0, 1.0),
     }
     unclipped = change + reward.stock_bonus * stock + reward.product_bonus * products
-    over_biomass = np.maximum(column["biomass_kgc_m2"] - reward.biomass_limit, 0.0)
-    over_soil = np.maximum(column["soil_kgc_m2"] - reward.soil_limit, 0.0)
-    crowded = column["density_after_action"] >= reward.density_limit - ROUND_OFF_STEMS
-    made = column["planted_stems_ha"] - column["thinned_stems_ha"]
+    over_biomass = np.maximum(biomass - reward.biomass_limit, 0.0)
+    over_soil = np.maximum(soil - reward.soil_limit, 0.0)
+    crowded = column("density_after_action") >= reward.density_limit - ROUND_OFF_STEMS
+    made = column("planted_stems_ha") - column("thinned_stems_ha")
     shortfall = np.abs(density_change - made)
     missed = np.where(shortfall < NEGLIGIBLE_STEMS, 0.0, shortfall / np.maximum(np.abs(density_change), 1.0))
     return {
@@ -314,17 +320,17 @@ def rewards_of_year(record: np.ndarray, actions: np.ndarray, reward: Reward, for
     record : annual records (n, columns of `sim.RECORD_NAMES`); actions : what was asked for, integers (n,);
     formulation : of the thaw reward, one of `THAW_FORMULATIONS`.
     """
-    components = reward_components(record, np.take(DENSITY_CHANGES, actions // 5), reward)
+    components = reward_components(record, decode(actions)[0], reward)
     carbon = carbon_reward(components)
     cooling, warming = (record[:, _COLUMN[f"boundary_{way}_mj_m2"]] for way in ("cooling", "warming"))
     thaw = thaw_reward(cooling, warming, reward, formulation)
-    rewarded = np.clip(np.stack([carbon, thaw], axis=1), -1.0, 1.0)
+    carbon_rewarded, thaw_rewarded = np.clip(carbon, -1.0, 1.0), np.clip(thaw, -1.0, 1.0)
     return {
         **components,
-        "carbon_clipped": carbon - rewarded[:, 0],
-        "thaw_clipped": thaw - rewarded[:, 1],
-        "carbon_reward": rewarded[:, 0],
-        "thaw_reward": rewarded[:, 1],
+        "carbon_clipped": carbon - carbon_rewarded,
+        "thaw_clipped": thaw - thaw_rewarded,
+        "carbon_reward": carbon_rewarded,
+        "thaw_reward": thaw_rewarded,
     }
 
 
@@ -427,6 +433,7 @@ class _Episodes:
         self.history_names = HISTORY_NAMES + tuple(
             f"{objective.name}_{what}" for objective in self.own_objectives for what in ("clipped", "reward")
         )
+        self.reward_columns = [self.history_names.index(f"{name}_reward") for name in self.objective_names]
         limits = [(o.low, o.high) if isinstance(o, Objective) else (-1.0, 1.0) for o in objectives]
         self.reward_space = Box(*np.array(limits, dtype=np.float32).T, dtype=np.float32)
         self.record_years = bool(record_years)
@@ -494,14 +501,15 @@ class _Episodes:
         actions = check_actions(actions, self.number)
         record = self.stands.step(actions)
         parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
-        columns = dict(zip(sim.RECORD_NAMES, record.T, strict=True)) | parts
         for objective in self.own_objectives:
-            columns |= objective.columns(columns)
-        self.history[np.arange(self.number), self.year] = np.column_stack([columns[n] for n in self.history_names])
+            parts |= objective.columns(dict(zip(sim.RECORD_NAMES, record.T, strict=True)) | parts)
+        added = np.array([parts[name] for name in self.history_names[record.shape[1] :]])
+        year = np.concatenate([record, added.T], axis=1)
+        self.history[np.arange(self.number), self.year] = year
         self.year = self.year + 1
         self.running = self.year < self.years
         self._observe_year(record, actions, parts)
-        return np.stack([columns[f"{name}_reward"] for name in self.objective_names], axis=1).astype(np.float32)
+        return year.take(self.reward_columns, axis=1).astype(np.float32)
 
     def observations(self) -> np.ndarray:
         """Fresh float32 observations, shape (number, entries)."""
@@ -558,20 +566,18 @@ class _Episodes:
 
     def _observe_year(self, record, actions, components) -> None:
         """Observation after a year; what was last year's becomes the year before's."""
-        column = {name: record[:, i] for name, i in _COLUMN.items()}
         values = np.zeros((self.number, len(OBSERVATION)))
         values[:, 1] = self.year
-        for i, name in _RECORDED.items():
-            values[:, i] = column[name]
+        values[:, _RECORDED_ENTRIES] = record[:, _RECORDED_COLUMNS]
         values[:, 24], values[:, 25] = actions // 5, actions % 5
-        values[:, 26] = column["planted_stems_ha"] - column["thinned_stems_ha"]
-        values[:, 27] = column["conifer_fraction_after_action"] - self._observation[:, 3]
-        values[:, _PENALTIES] = np.stack([components[name] for name in OBSERVATION_NAMES[_PENALTIES]], axis=1)
+        values[:, 26] = record[:, _COLUMN["planted_stems_ha"]] - record[:, _COLUMN["thinned_stems_ha"]]
+        values[:, 27] = record[:, _COLUMN["conifer_fraction_after_action"]] - self._observation[:, 3]
+        values[:, _PENALTIES] = np.array([components[name] for name in OBSERVATION_NAMES[_PENALTIES]]).T
         self._fill_stand(values, self.stands.stocks(np.arange(self.number)))
         scaled = (values + _SHIFT) / _SCALE
         scaled[:, 5:11] = self._observation[:, 5:11]
         scaled[:, _SITE] = self._observation[:, _SITE]
-        scaled[:, [12, 14, 16]] = self._observation[:, [11, 13, 15]]
+        scaled[:, 12:17:2] = self._observation[:, 11:16:2]
         self._observation = scaled
 
     @staticmethod

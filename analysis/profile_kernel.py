@@ -51,6 +51,8 @@ PHASES = {
     "snowfall": (arrival.snowfall, "SECONDS"),
     "no_snow": (arrival.no_snow, ""),
     "rainfall": (arrival.rainfall, ""),
+    "ground_exchange": (solve.ground_exchange, ""),
+    "snow_vapour": (solve.snow_vapour, "SECONDS"),
     "conductances": (solve.conductances, "SECONDS"),
     "solve_canopy": (solve.solve_canopy, ""),
     "move_energy_and_water": (transfer.move_energy_and_water, "SECONDS"),
@@ -150,7 +152,7 @@ def where_time_goes(lanes: int = LANES, repeats: int = 15) -> pd.DataFrame:
             if name == "any_sun":
                 left_out.append("darkness" if arrival.any_sun(blocks[0]) else "sunlight")
             if name == "any_snow":
-                left_out.append("no_snow" if arrival.any_snow(blocks[0]) else "snowfall")
+                left_out += ["no_snow"] if arrival.any_snow(blocks[0]) else ["snowfall", "snow_vapour"]
         table.loc["solve_canopy", moment] -= table.loc["conductances", moment]
         table.loc["sum", moment] = table.loc[list(PHASES), moment].sum()
     return table

@@ -118,7 +118,7 @@ def newton_step(trial, residual, slope, by_emission, low, high):
     third = 4.0 * STEFAN_BOLTZMANN * kelvin * by_emission * inverse
     second = 1.5 * kelvin * third
     step = -residual * inverse
-    newton = trial + step * (1.0 - step * (second - step * (2.0 * second * second - third)))
+    newton = trial + step - step * step * (second - step * (2.0 * second * second - third))
     inside = low < newton and newton < high
     proposal = newton if inside else 0.5 * (low + high)
     return proposal, low, high

@@ -13,6 +13,8 @@ TOLERANCES = {
     "annual_carbon_residual_kgc_m2": 1e-9,
     "stems_residual_ha": 1e-9,
 }
+_COLUMNS = [RECORD_NAMES.index(name) for name in TOLERANCES]
+_STEMS, _DENSITY = list(TOLERANCES).index("stems_residual_ha"), RECORD_NAMES.index("density_stems_ha")
 
 
 class PhysicsError(RuntimeError):
@@ -24,19 +26,18 @@ def check_closure(state, record, parameters, describe) -> None:
 
     state, record, parameters : (stands, fields) each; describe : function of a row that says which year of which stand.
     """
-    columns = [RECORD_NAMES.index(name) for name in TOLERANCES]
-    stocks = 1.0 + record[:, RECORD_NAMES.index("density_stems_ha")]
-    limits = np.array(list(TOLERANCES.values())) * np.ones((len(record), 1))
-    limits[:, list(TOLERANCES).index("stems_residual_ha")] *= stocks
-    failed = ~(record[:, columns] <= limits)
-    infinite = ~np.isfinite(state).all(axis=1)
-    if not failed.any() and not infinite.any():
+    residuals = record[:, _COLUMNS]
+    limits = np.tile(list(TOLERANCES.values()), (len(record), 1))
+    limits[:, _STEMS] *= 1.0 + record[:, _DENSITY]
+    closed = residuals <= limits
+    finite = np.isfinite(state)
+    if closed.all() and finite.all():
         return
-    if failed.any():
-        k, column = np.argwhere(failed)[0]
-        problem = f"{list(TOLERANCES)[column]} = {record[k, columns[column]]:.3g} beyond {limits[k, column]:.1g}"
+    if not closed.all():
+        k, column = np.argwhere(~closed)[0]
+        problem = f"{list(TOLERANCES)[column]} = {residuals[k, column]:.3g} beyond {limits[k, column]:.1g}"
     else:
-        k = int(np.argmax(infinite))
+        k = int(np.argmin(finite.all(axis=1)))
         wrong = [name for name, value in zip(STATE_NAMES, state[k], strict=False) if not np.isfinite(value)]
         problem = f"{', '.join(wrong) or 'stems'} not finite"
     terms = ", ".join(f"{name}={value:.6g}" for name, value in zip(RECORD_NAMES, record[k], strict=True))

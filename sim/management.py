@@ -10,6 +10,7 @@ from sim.jit import compiled
 DENSITY_CHANGES = (-100.0, -50.0, 0.0, 50.0, 100.0)  # stems ha-1
 CONIFER_MIXES = (0.0, 0.25, 0.5, 0.75, 1.0)
 NUM_ACTIONS = len(DENSITY_CHANGES) * len(CONIFER_MIXES)
+_CHANGES, _MIXES = np.array(DENSITY_CHANGES), np.array(CONIFER_MIXES)
 LEAST_DENSITY = 150.0  # stems ha-1 that thinning leaves
 LARGEST_DENSITY = 2000.0  # stems ha-1 that planting reaches
 NEGLIGIBLE_STEMS = 0.01  # stems ha-1; a smaller shortfall counts as done
@@ -18,7 +19,7 @@ NEGLIGIBLE_STEMS = 0.01  # stems ha-1; a smaller shortfall counts as done
 def decode(actions) -> tuple[np.ndarray, np.ndarray]:
     """Density change [stems ha-1] and conifer share of integer actions, a = 5 x density index + mix index."""
     actions = np.asarray(actions)
-    return np.take(DENSITY_CHANGES, actions // 5), np.take(CONIFER_MIXES, actions % 5)
+    return _CHANGES[actions // 5], _MIXES[actions % 5]
 
 
 def check_actions(actions, number) -> np.ndarray:

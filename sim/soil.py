@@ -81,7 +81,7 @@ def respond_to_canopy(
     trunk_by_canopy, trunk_by_ground, ground_base, ground_by_emission, ground_by_canopy), the ground's stiffness
     [W m-2 K-1] and its inverse, `yielding`.
     """
-    yielding = 1.0 / (deep_inertia + surface_deep + deep_boundary)
+    yielding = 1.0 / (deep_inertia + deep_boundary + surface_deep)
     deep_base = (deep_inertia * deep + deep_boundary * boundary) * yielding
     deep_by_surface = surface_deep * yielding
 
@@ -94,21 +94,22 @@ def respond_to_canopy(
     trunk_by_canopy = trunk_canopy * yielding
     trunk_by_ground = trunk_ground * yielding
 
+    # Here too what is known last is added last (see `sim.canopy.canopy_balance`).
     stiffness = (
         ground_inertia
         + ground_emissivity * ground_emission_slope
+        + trunk_ground * (1.0 - trunk_by_ground)
         + ground_air
         + vapour_slope
-        + trunk_ground * (1.0 - trunk_by_ground)
         + ground_surface * (1.0 - surface_by_ground)
     )
     yielding = 1.0 / stiffness
     ground_base = (
-        (ground_inertia + vapour_slope) * ground
-        + ground_source
+        ground_inertia * ground
         - ground_emissivity * (ground_emission - ground_emission_slope * ground)
-        + ground_air * air
         + trunk_ground * trunk_base
+        + (ground_air * air + vapour_slope * ground)
+        + ground_source
         + ground_surface * surface_base
     ) * yielding
     ground_by_emission = ground_emissivity * cover * yielding

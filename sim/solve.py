@@ -21,6 +21,32 @@ from sim.weather import (
 
 
 @compiled
+def ground_exchange(b):
+    """Exchange of the ground with the air [m s-1] at the start of the step."""
+    s, p, w = b.s, b.p, b.w
+    for i in range(len(s.swe)):
+        w.ground_exchange[i] = w.ground_velocity[i] * stability(
+            s.ground[i], w.air[i], w.wind_below[i], p.ground_reference_height_m[i],
+            p.stability_factor[i], p.instability_limit[i],
+        )  # fmt: skip
+
+
+@compiled
+def snow_vapour(b, seconds):
+    """Latent heat from lying snow at the start of the step, and its slope by the ground's temperature."""
+    s, w = b.s, b.w
+    for i in range(len(s.swe)):
+        ice = min(s.ground[i], 0.0)  # snow that falls on a warm skin is at 0 degC
+        over_ice = saturation_pressure(ice)
+        # At 0 degC, no more vapour is exchanged within the step than snow lies there: the limit is on the conductance,
+        # so that the ground's equation and what is moved agree.
+        drying = max(abs(SATURATION_AT_FREEZING_HPA - w.humidity[i]), 1e-3)
+        transfer = min(w.vapour_density[i] * w.ground_exchange[i], s.swe[i] / (seconds * drying))
+        w.snow_latent[i] = LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.humidity[i])
+        w.latent_slope[i] = LATENT_HEAT_SUBLIMATION * transfer * saturation_slope(ice, over_ice)
+
+
+@compiled
 def conductances(b, seconds):
     """Conductances at the start of the step, evaporation coefficients, and the nodes' answer to the canopy."""
     s, p, w = b.s, b.p, b.w
@@ -37,30 +63,18 @@ def conductances(b, seconds):
         w.wet_coefficient[i] = wet * scale
         w.wet_limit[i] = LATENT_HEAT_VAPORISATION * per_second * s.canopy_rain[i]
 
-        velocity = w.ground_velocity[i] * stability(
-            s.ground[i], w.air[i], w.wind_below[i], p.ground_reference_height_m[i],
-            p.stability_factor[i], p.instability_limit[i],
-        )  # fmt: skip
-        w.ground_conductance[i] = max(w.air_density[i] * AIR_HEAT_CAPACITY * velocity, p.minimum_conductance[i])
-
+        exchange = w.air_density[i] * AIR_HEAT_CAPACITY * w.ground_exchange[i]
+        w.ground_conductance[i] = max(exchange, p.minimum_conductance[i])
         emission = black_body(s.ground[i] + FREEZING_POINT_K)
         emission_slope = black_body_slope(s.ground[i] + FREEZING_POINT_K)
         snow = s.swe[i] > 0.0
-        ice = min(s.ground[i], 0.0)  # snow that falls on a warm skin is at 0 degC
-        over_ice = saturation_pressure(ice)
-        ice_slope = saturation_slope(ice, over_ice)
-        # At 0 degC, no more vapour is exchanged within the step than snow lies there: the limit is on the conductance,
-        # so that the ground's equation and what is moved agree.
-        drying = max(abs(SATURATION_AT_FREEZING_HPA - w.humidity[i]), 1e-3)
-        transfer = min(w.vapour_density[i] * velocity, s.swe[i] / (seconds * drying))
+        ice = min(s.ground[i], 0.0)
         sky_and_canopy = longwave_down(w.sky[i], w.air_emission[i], w.longwave_cover[i])
         available = w.ground_sw[i] + p.ground_emissivity[i] * (sky_and_canopy - emission)
         thawed = w.air[i] > 0.0 and s.ground[i] > 0.0
         moist = min(p.priestley_taylor_ground[i] * equilibrium * w.water_stress[i], 1.0) if thawed else 0.0
-        w.ground_latent[i] = (
-            LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.humidity[i]) if snow else moist * max(available, 0.0)
-        )
-        w.latent_slope[i] = LATENT_HEAT_SUBLIMATION * transfer * ice_slope if snow else 0.0
+        snow_latent = w.snow_latent[i]  # loaded first, as in `sim.day.wind_exchange`
+        w.ground_latent[i] = snow_latent if snow else moist * max(available, 0.0)
 
         w.surface[i] = temperature(
             s.surface_heat[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], p.soil_freezing_range_k[i]

@@ -163,12 +163,15 @@ class Stands:
         classes = np.add.reduceat(stems, edges, axis=2).reshape(len(state), -1)
         density = stems.sum(axis=(1, 2))
         conifers = stems[:, 0].sum(axis=1)
-        column = {name: state[:, i] for i, name in enumerate(STATE_NAMES)}
+
+        def column(name):
+            return state[:, STATE_NAMES.index(name)]
+
         return {
             "density_stems_ha": density,
             "conifer_fraction": np.where(density > 0.0, conifers / np.where(density > 0.0, density, 1.0), 0.0),
-            "biomass_kgc_m2": column["conifer_biomass"] + column["deciduous_biomass"],
-            "soil_kgc_m2": column["soil_carbon"].copy(),
+            "biomass_kgc_m2": column("conifer_biomass") + column("deciduous_biomass"),
+            "soil_kgc_m2": column("soil_carbon").copy(),
             "age_classes": classes,
         }
 

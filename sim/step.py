@@ -8,7 +8,7 @@ from sim.day import wind_exchange
 from sim.jit import compiled
 from sim.radiation import black_body
 from sim.snow import ICE_HEAT_CAPACITY, LATENT_HEAT_FUSION
-from sim.solve import conductances, solve_canopy
+from sim.solve import conductances, ground_exchange, snow_vapour, solve_canopy
 from sim.transfer import move_carbon, move_energy_and_water
 from sim.water import water_stress
 from sim.weather import FREEZING_POINT_K, saturation_pressure, saturation_pressure_water, saturation_slope, snow_share
@@ -22,11 +22,15 @@ def simulate_step(b, seconds):
         sunlight(b)
     else:
         darkness(b)
-    if any_snow(b):
+    snow = any_snow(b)
+    if snow:
         snowfall(b, seconds)
     else:
         no_snow(b)
     rainfall(b)
+    ground_exchange(b)
+    if snow:
+        snow_vapour(b, seconds)
     conductances(b, seconds)
     solve_canopy(b)
     move_energy_and_water(b, seconds)

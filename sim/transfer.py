@@ -57,7 +57,7 @@ def move_energy_and_water(b, seconds):
         heat = (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) * s.ground[i] - carried
         heat += seconds * (
             w.ground_sw[i] + p.ground_emissivity[i] * (down - ground_emission)
-            - ground_heat - latent + trunk_to_ground - ground_to_surface
+            - ground_heat - ground_to_surface + trunk_to_ground - latent
         )  # fmt: skip
         s.swe[i] -= sublimated
         melted = min(max(heat, 0.0) * (1.0 / LATENT_HEAT_FUSION), s.swe[i]) if snow else 0.0

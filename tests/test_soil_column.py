@@ -95,7 +95,7 @@ def test_the_annual_wave_decays_with_depth():
 @pytest.mark.parametrize(("surface", "swe"), [(8.0, 0.0), (-20.0, 60.0), (-0.8, 30.0)])
 def test_two_nodes_have_the_simulators_conductances(surface, swe):
     b = block()
-    uncompiled(simulate_year)(b, 1, 1, np.zeros((0, 6, 1)), np.zeros((0, len(DAILY), 1)))
+    uncompiled(simulate_year)([b], 1, 1, np.zeros((0, 6, 1)), np.zeros((0, len(DAILY), 1)))
     snow = swe * b.w.snow_resistance[0]
     steady = driven_by(np.full(DAYS, surface), snow=snow, organic=b.s.organic_depth[0])
     column = spun_up(SCHEMES["two nodes: the simulator's"], GROUND, steady)
@@ -119,7 +119,7 @@ def test_the_recorded_surface_is_the_simulators():
     b = block()
     uncompiled(record_year)(b, 1, *nothing, surface)
     other = block()
-    uncompiled(simulate_year)(other, 1, DAYS, nothing[0], daily)
+    uncompiled(simulate_year)([other], 1, DAYS, nothing[0], daily)
     assert surface[0, :, 0] == approx(daily[:, DAILY.index("ground_temperature_c"), 0], abs=1e-12)
     snowy = daily[:, DAILY.index("swe_mm"), 0] > 0.0
     assert 100 < snowy.sum() < 300 and ((surface[1, :, 0] > 0.0) == snowy).all()
