@@ -3,6 +3,7 @@
 Stands are rows of arrays, (stands, fields); a block has them as lanes of `sim.state.block_dtype`.
 """
 import functools
+import threading
 import math
 from types import SimpleNamespace
 
@@ -77,10 +78,16 @@ def namespace(record):
     )
 
 
-@functools.cache
 def kernel(lanes: int):
     """The year kernel for blocks of this many lanes, compiled at its first call or loaded from the disk cache."""
-    return specialised(simulate_year, f"{lanes}_lanes")
+    with _MAKING:
+        if lanes not in _MADE:
+            _MADE[lanes] = specialised(simulate_year, f"{lanes}_lanes")
+        return _MADE[lanes]
+
+
+_MADE: dict = {}  # kernels by lanes
+_MAKING = threading.Lock()  # threads may come together, and numba's cache folder is one setting for all of them
 
 
 @functools.cache

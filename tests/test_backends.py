@@ -1,6 +1,9 @@
 """One physics: interpreted or compiled, one stand or many in lockstep, in any order, in one go or resumed."""
 
 import pickle
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas as pd
@@ -8,6 +11,7 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 import sim
+from sim import block
 from sim.block import kernel
 from sim.state import DAILY
 
@@ -237,6 +241,22 @@ def compiled_functions(dispatcher, found=None):
             if isinstance(source.__globals__.get(name), Dispatcher):
                 compiled_functions(source.__globals__[name], found)
     return found
+
+
+def test_threads_that_come_together_make_one_kernel(monkeypatch):
+    """numba's cache folder is a setting of the process: two at once would write the kernel into the working folder."""
+    made, both = [], threading.Barrier(2)
+
+    def slow(function, name):
+        made.append(name)
+        time.sleep(0.1)
+        return object()
+
+    monkeypatch.setattr(block, "_MADE", {})
+    monkeypatch.setattr(block, "specialised", slow)
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(lambda _: (both.wait(), kernel(16))[1], range(2))
+    assert first is second and made == ["16_lanes"]
 
 
 def test_kernels_for_one_and_sixteen_lanes_have_no_name_in_common():
