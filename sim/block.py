@@ -3,8 +3,8 @@
 Stands are rows of arrays, (stands, fields); a block has them as lanes of `sim.state.block_dtype`.
 """
 import functools
-import threading
 import math
+import threading
 from types import SimpleNamespace
 
 import numpy as np
