@@ -239,12 +239,14 @@ QUICK_EVALUATION = {"eval_episodes": 2, "eval_weights": (0.0, 0.5, 1.0)}
 
 
 def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path = QUICK_DIR) -> list[Job]:
-    """Every kind of job once, in seconds: one seed, the outer weights, one other formulation, tiny budgets."""
-    small = []
+    """Every script of every experiment, in seconds: one seed, the first of its settings, the outer weights."""
+    small, seen = [], set()
     for number, job in enumerate(jobs(only, [1])):
         flags = dict(job.flags)
-        if flags.get("preference", 0.0) not in (0.0, 1.0) or flags.get("thaw_formulation") == "raw_degree_days":
+        kind = job.experiment, job.script, flags.get("preference")
+        if kind in seen or flags.get("preference", 0.0) not in (0.0, 1.0):
             continue
+        seen.add(kind)
         if job.is_study:
             small.append(Job(job.experiment, job.script, {"quick": True}))
             continue
