@@ -1,4 +1,4 @@
-"""Writes the measured results into README.md and docs/algorithms/*.md, from the archived runs.
+"""Writes the measured results into README.md, docs/algorithms/*.md and docs/learning.md, from the archived runs.
 
     python analysis/document_results.py
 
@@ -16,10 +16,11 @@ import pandas as pd
 
 from analysis import experiments, metrics, protocol, runs
 from analysis.results import METHODS, TITLES, Results
-from analysis.tables import main_results
+from analysis.tables import distance_to_best, main_results
 from analysis.tables.common import GENERALIST, over_seeds
 
-PAGES = ("README.md", *(f"docs/algorithms/{name}.md" for name in (*experiments.TRAINED, "heuristics")))
+PAGES = ("README.md", "docs/learning.md",
+         *(f"docs/algorithms/{name}.md" for name in (*experiments.TRAINED, "heuristics")))  # fmt: skip
 SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
 PLANS = {"dense_conifer": "100 conifers a year", "best_constant_mix": "best constant plan of each weight"}
 ENDS = (0.0, 1.0)  # weights
@@ -98,8 +99,29 @@ def plans(results: Results) -> list[tuple[str, list]]:
             if found[name, GENERALIST, "default"]]  # fmt: skip
 
 
+def distances(results: Results) -> str:
+    """How near agents and fixed strategies come to the best known plans of the fronts' sites, in whole percent."""
+    table = distance_to_best.make(results)
+    if not table.seeds.any():
+        return "Not played yet.\n"
+    shares = [f"share_{weight:g}" for weight in experiments.WEIGHTS] + ["hypervolume"]
+    text = "| % of the best known gain at carbon weight | seeds | " + " | ".join(
+        f"{weight:g}" for weight in experiments.WEIGHTS) + " | % of the hypervolume |\n" + "|---" * 8 + "|\n"
+    for _, row in table[table.sites.str.endswith(distance_to_best.ALL)].iterrows():
+        trained = row.method in experiments.TRAINED
+        words = [TITLES.get(row.method, row.method), *((flags(row.setting), row.policy) if trained else ())]
+        cells = [", ".join(filter(None, words)), str(row.seeds) if trained else ""]
+        for name in shares:
+            low, high = row[f"{name}_low"], row[f"{name}_high"]
+            cells.append(f"{row[name]:.0f}" + ("" if np.isnan(low) else f" ({low:.0f} .. {high:.0f})"))
+        text += "| " + " | ".join(cells) + " |\n"
+    return text
+
+
 def section(results: Results, name: str) -> str:
-    """What stands between the comments: of all methods, of the heuristics, or of one script."""
+    """What stands between the comments: of all methods, of the heuristics, of one script, or the distances."""
+    if name == "distances":
+        return distances(results)
     rows = []
     if name == "all":
         for script in (*experiments.METHODS, *experiments.HEURISTICS):
