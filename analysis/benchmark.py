@@ -279,7 +279,8 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
         step = {"physics": physics, "plumbing": environment - physics, "policy": rollout - environment,
                 "update": update}  # fmt: skip
         year = took["evaluation"] / played
-        whole = (300_000 * sum(step.values()) + 2 * 11 * 100 * boreal_env.DEFAULT_YEARS * year) / 60_000.0
+        evaluated = 100 * len(protocol.POLICIES) * len(protocol.EVAL_WEIGHTS) * boreal_env.DEFAULT_YEARS
+        whole = (300_000 * sum(step.values()) + evaluated * year) / 60_000.0
         return {
             (f"{kind}, 300,000 steps with evaluation", "min"): whole,
             **{(f"{kind}, {number} stands: {part}", "ms per step"): value for part, value in step.items()},

@@ -4,7 +4,18 @@ import numpy as np
 
 from analysis import metrics
 from analysis.experiments import HEURISTICS, METHODS
-from analysis.figures.common import COLOURS, SEEDS_95, STEPS, band, finish, learning_curve, methods, no_data, panels
+from analysis.figures.common import (
+    COLOURS,
+    SEEDS_95,
+    STEPS,
+    band,
+    binned,
+    finish,
+    learning_curve,
+    methods,
+    no_data,
+    panels,
+)
 from analysis.results import TITLES
 from analysis.studies import constant_plans
 from analysis.studies.training_gains import gains
@@ -43,17 +54,12 @@ def draw(figure, results) -> None:
 
 
 def gain_curve(ax, replicates, nothing, column: str, colour) -> None:
-    """A gain of the training episodes against environment steps."""
+    """A gain of the training episodes against environment steps; none until every seed has it: a part may mislead."""
     found = [(one.runs[0], gains(one.runs[0], nothing)) for one in replicates]
-    found = [(run, table) for run, table in found if table is not None]
-    if not found:
+    if any(table is None for _, table in found):
         return
     steps = max(run.arguments["total_timesteps"] for run, _ in found)
-    curves = []
-    for _, table in found:
-        part = np.minimum((table.global_step - 1) * PARTS // steps, PARTS - 1)
-        curves.append(table[column].groupby(part).mean().reindex(range(PARTS)).to_numpy())
-    curves = np.array(curves)
+    curves = np.array([binned(table, column, steps, bins=PARTS) for _, table in found])
     known = ~np.isnan(curves).any(axis=0)
     x = (np.arange(PARTS) + 0.5) * steps / PARTS / 1000
     band(ax, x[known], curves[:, known], colour, None)
