@@ -15,15 +15,21 @@ from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype
 from sim.year import simulate_year
 
 LANES = 16
+HALF = LANES // 2  # whose year takes two thirds as long as that of all
 CACHE_LINE = 64  # bytes
 BACKENDS = ("numba", "python")
 
 
 def blocks(number: int) -> list[slice]:
-    """Split stands into calls of the kernel: blocks of sixteen lanes; a few stands go one by one."""
-    if number < LANES // 2:
+    """Split stands into calls of the kernel: blocks of sixteen, and what is left over; a few stands go one by one."""
+    if number < HALF:
         return [slice(k, k + 1) for k in range(number)]
     return [slice(k, min(k + LANES, number)) for k in range(0, number, LANES)]
+
+
+def lanes_for(number: int) -> int:
+    """Lanes of the kernel that a block of so many stands runs in."""
+    return 1 if number == 1 else HALF if number <= HALF else LANES
 
 
 def run_block(
@@ -36,7 +42,7 @@ def run_block(
     the annual record, (stands, fields) each, and touches nothing else.
     """
     number = len(parameters)
-    lanes = LANES if number > 1 else 1
+    lanes = lanes_for(number)
     rows = aligned_zeros((block_dtype(lanes).itemsize // (8 * lanes), lanes))
     block = np.ndarray(1, block_dtype(lanes), buffer=rows)
     fill = np.minimum(np.arange(lanes), number - 1)
@@ -98,6 +104,6 @@ def interpreted():
 
 def compile_kernels(number: int) -> None:
     """Have the kernels ready that so many stands need, so that processes forked later find them."""
-    for lanes in sorted({LANES if b.stop - b.start > 1 else 1 for b in blocks(number)}):
+    for lanes in sorted({lanes_for(b.stop - b.start) for b in blocks(number)}):
         block = np.zeros(1, block_dtype(lanes))
         kernel(lanes)(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes)))

@@ -15,7 +15,7 @@ from sim import block
 from sim.block import kernel
 from sim.state import DAILY
 
-NUMBER = 19  # one block of sixteen lanes and a part of another
+NUMBER = 19  # a block of sixteen lanes, and three stands in one of eight
 MINUTES = 120
 
 
@@ -106,7 +106,7 @@ def test_observed_weather_is_the_same_interpreted_and_compiled():
 
 
 def test_the_interpreted_backend_steps_lanes_too():
-    seeds = range(8)  # from eight stands on, the block has sixteen lanes
+    seeds = range(8)  # from eight stands on they are lanes of a block
     compiled = start(8, time_step_minutes=1440)
     interpreted = sim.Stands(8, time_step_minutes=1440, backend="python")
     interpreted.set_state(compiled.get_state())
@@ -259,12 +259,12 @@ def test_threads_that_come_together_make_one_kernel(monkeypatch):
     assert first is second and made == ["16_lanes"]
 
 
-def test_kernels_for_one_and_sixteen_lanes_have_no_name_in_common():
+def test_kernels_for_other_numbers_of_lanes_have_no_name_in_common():
     """numba names compiled code by counters of the compiling process: cached by two processes, functions of one name
-    would be taken for each other in a third that loads both kernels, and give zeros or a crash."""
-    one, sixteen = ({f.py_func.__qualname__ for f in compiled_functions(kernel(lanes))} for lanes in (1, 16))
-    assert len(one) == len(sixteen) > 50
-    assert not one & sixteen
+    would be taken for each other in a third that loads two kernels, and give zeros or a crash."""
+    one, eight, sixteen = ({f.py_func.__qualname__ for f in compiled_functions(kernel(lanes))} for lanes in (1, 8, 16))
+    assert len(one) == len(eight) == len(sixteen) > 50
+    assert not one & eight | one & sixteen | eight & sixteen
 
 
 def test_a_stand_that_has_not_been_started_is_refused():
