@@ -10,7 +10,8 @@ ROOT = Path(__file__).parents[1]
 HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 METHODS = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum")  # conditioned on the preference
 TRAINED = (*METHODS, "eupg_fixed_lambda")
-STUDIES = ("constant_plans", "training_gains", "mechanism_pairs", "site_warming", "signal_to_noise", "distance_to_best")
+STUDIES = ("constant_plans", "training_gains", "mechanism_pairs", "site_warming", "signal_to_noise", "gradient_noise",
+           "distance_to_best")  # fmt: skip
 READING = ("training_gains", "site_warming", "distance_to_best")  # studies that read the runs before them
 WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SITE_SEEDS = (1, 2, 3, 4, 5)
@@ -32,7 +33,7 @@ EXPERIMENTS = {
     "variants": "gated PPO with rescaled rewards, other advantages, fewer observations, another learning rate",
     "mechanisms": "physical conflicts, counterfactual pairs, warming of selected sites",
     "single": "gated PPO on one site alone, under all its weathers and first stands",
-    "difficulty": "why thaw is hard to learn: signal to noise of an action; distance to the best known plans",
+    "difficulty": "why thaw is hard to learn: noise of actions and gradients; distance to the best known plans",
 }
 
 
@@ -218,7 +219,7 @@ def front_sites(seeds) -> list[Job]:
 
 def difficulty(seeds) -> list[Job]:
     """Studies of how hard thaw is to learn; the distance to the best plans reads the checkpoints of all runs."""
-    return [Job("difficulty", script) for script in ("signal_to_noise", "distance_to_best")]
+    return [Job("difficulty", script) for script in ("signal_to_noise", "gradient_noise", "distance_to_best")]
 
 
 JOBS_OF = {"main": main_table, "fixed": fixed_weights, "site": single_sites, "thaw": thaw_formulations,

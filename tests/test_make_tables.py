@@ -316,10 +316,16 @@ def test_what_learning_is_up_against(tmp_path):
     parts = pd.DataFrame({"component": ["site", "policy"] * 2, "objective": ["carbon"] * 2 + ["thaw"] * 2,
                           "value": "return", "share": [0.4, 0.6, 0.9, 0.1]})
     stored.write(tmp_path / "variance" / "components.csv", parts, {})
+    gradients = pd.DataFrame({"utility": "total", "baseline": "none", "objective": ["carbon", "thaw", "preference"],
+                              "episodes": [20.0, np.inf, 1.0], "episodes_low": [10.0, 90.0, 1.0],
+                              "episodes_high": [30.0, np.inf, 1.0]})  # fmt: skip
+    stored.write(tmp_path / "studies" / "gradient_noise.csv", gradients, {})
     results = Results((TINY_RUNS,), experiments.jobs(), tmp_path / "studies")
     table = learning_difficulty.make(results).set_index(["of", "quantity"])
     assert table.loc[("variance of returns", "site %"), ["carbon", "thaw"]].tolist() == [40, 90]
     assert table.loc[("thin", "effect on the return"), ["thaw", "thaw_low", "thaw_high"]].tolist() == [1, 0.5, 2]
     assert table.loc[("thin", "effect that GAE rewards carry %"), "carbon"] == 25
+    gradient = table.loc[(learning_difficulty.GRADIENT, "episodes, total utility, baseline: none")]
+    assert gradient[["carbon", "carbon_low", "thaw", "thaw_low"]].tolist() == [20, 10, np.inf, 90]
     nothing = learning_difficulty.make(Results((TINY_RUNS,), experiments.jobs(), TINY_RUNS / "no studies"))
     assert all(text.startswith("not there: python analysis/") for text in nothing.quantity)

@@ -1,6 +1,6 @@
-"""Why thaw is harder to learn than carbon: what the returns vary with, and the effect of an action against the noise.
+"""Why thaw is harder to learn than carbon: what the returns vary with, and actions' effects against their noise.
 
-From analysis/studies/variance.py and analysis/studies/signal_to_noise.py; docs/learning.md defines every row.
+From variance.py, signal_to_noise.py and gradient_noise.py of analysis/studies; docs/learning.md defines every row.
 """
 
 import numpy as np
@@ -12,6 +12,7 @@ from analysis.studies.signal_to_noise import CONTRASTS, EVERY, UNIFORM, YEARS, e
 
 TITLE = "Difficulty of learning"
 COLUMNS = {"of": "of", "quantity": "quantity", "carbon": "carbon", "thaw": "thaw"}
+GRADIENT = "EUPG's gradient, as much signal as noise"
 VALUES = {"return": "variance of returns", "one year": "variance of one year's rewards"}
 YEAR = "5"  # of the action: the stand is there, and most of the episode still to come
 #: Row -> (weighting of the years to come, column, factor).
@@ -95,5 +96,12 @@ def make(results) -> pd.DataFrame:
                      for objective in OBJECTIVES}  # fmt: skip
             needed = {objective: shared_episodes(case, noise) for objective, case in years.items()}
             rows.append({"of": contrast, "quantity": quantity, **needed})
+    gradients = results.study("gradient_noise")
+    if gradients is None:
+        rows.append({"of": GRADIENT, "quantity": "not there: python analysis/studies/gradient_noise.py"})
+    else:
+        for (utility, baseline), case in gradients.groupby(["utility", "baseline"], sort=False):
+            needed = of_objectives(case.set_index("objective"), "episodes", 1)
+            rows.append({"of": GRADIENT, "quantity": f"episodes, {utility} utility, baseline: {baseline}", **needed})
     columns = [f"{objective}{end}" for objective in OBJECTIVES for end in ("", "_low", "_high")]
-    return pd.DataFrame(rows, columns=["of", "quantity", *columns]).replace(np.inf, np.nan)
+    return pd.DataFrame(rows, columns=["of", "quantity", *columns])
