@@ -124,11 +124,22 @@ def signal_and_noise(means: np.ndarray, squares: np.ndarray) -> dict[str, float]
     signal = (all_products - own.sum()) / (number * (number - 1))
     without = (all_products - 2 * (means @ total) + own - (own.sum() - own)) / ((number - 1) * (number - 2))
     error = ((number - 1) / number * ((without - without.mean()) ** 2).sum()) ** 0.5
-    row = {"signal": signal, "signal_low": signal - Z * error, "signal_high": signal + Z * error,
-           "noise": squares.mean() - signal}  # fmt: skip
-    for end, of in (("", signal), ("_low", row["signal_high"]), ("_high", row["signal_low"])):
-        row[f"episodes{end}"] = row["noise"] / of if of > 0 else np.inf
-    return row
+    return {"signal": signal, "signal_low": signal - Z * error, "signal_high": signal + Z * error,
+            "noise": squares.mean() - signal}  # fmt: skip
+
+
+def with_episodes(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with `episodes`, each row's noise over the objective's signal, and its interval.
+
+    No baseline and neither utility changes what the gradient is on average, so there is one signal an objective: that
+    of the row with the least noise, which knows it best. (The others' intervals contain it, if nothing is wrong.)
+    """
+    best = table.loc[table.groupby("objective").noise.idxmin()].set_index("objective")
+    needed = {}
+    for end, of in (("", "signal"), ("_low", "signal_high"), ("_high", "signal_low")):
+        signal = table.objective.map(best[of])
+        needed[f"episodes{end}"] = (table.noise / signal).where(signal > 0, np.inf)
+    return table.assign(**needed)
 
 
 def study(design: Design) -> pd.DataFrame:
@@ -155,11 +166,11 @@ def study(design: Design) -> pd.DataFrame:
             means[:, :, site] += gradient / design.episodes
             squares[:, :, site, k] = (gradient.astype(np.float64) ** 2).sum(axis=-1)
         progress.show(site + 1)
-    return pd.DataFrame([
+    return with_episodes(pd.DataFrame([
         {"utility": utility, "baseline": baseline, "objective": objective,
          **signal_and_noise(means[case, which], squares[case, which])}
         for case, (utility, baseline) in enumerate(cases) for which, objective in enumerate(OBJECTIVES)
-    ])  # fmt: skip
+    ]))  # fmt: skip
 
 
 def report(table: pd.DataFrame) -> None:
