@@ -189,6 +189,9 @@ if __name__ == "__main__":
             if not next_done.all():
                 protocol.fail(f"--env-id {args.env_id}: EUPG needs episodes of one length, and one ended at step "
                               f"{len(rewards)} before the others")
+            if global_step > args.total_timesteps:
+                protocol.fail(f"--total-timesteps {args.total_timesteps} has no room for a batch, an episode of each "
+                              f"environment: {global_step} steps")
             for i in range(args.num_envs):
                 episode += 1
                 carbon, thaw = episode_returns[i]

@@ -287,7 +287,7 @@ if __name__ == "__main__":
 
             # advantages, and bootstrap values of the episodes that the rollout cuts
             with torch.no_grad():
-                next_value = agent.get_value(torch.from_numpy(next_obs))
+                next_value = agent.get_value(torch.Tensor(next_obs))
             last_done = torch.from_numpy(next_done).float()[:, None]
             advantages = compute_gae(rewards, values, dones, next_value, last_done, args.gamma, args.gae_lambda)
             returns = advantages + values

@@ -1,28 +1,47 @@
 """The toy, able to be resumed, and told by its environment variables when to fail."""
 
+import multiprocessing
 import os
 import time
 
 import gymnasium as gym
+import numpy as np
 from toy_env import ToyEnv
 
 
 class ResumableToyEnv(ToyEnv):
-    """TOY_ERROR_AT: the step of the environment's life at which it fails; TOY_SECONDS: what each step takes."""
+    """Told by TOY_ERROR, "where number", to fail: in its numberth "step" or "mask", or at "making" in a worker.
+
+    "nan number": that step's reward is NaN. TOY_SECONDS: what each step takes.
+    """
 
     def __init__(self, with_site: bool = True):
         super().__init__(with_site)
-        self.life = 0
+        self.lives = {"step": 0, "mask": 0, "nan": 0, "making": 0}
+        if multiprocessing.parent_process() is not None and self._fails("making"):
+            raise FloatingPointError("no ground to stand on")
+
+    def _fails(self, where):
+        self.lives[where] += 1
+        return os.environ.get("TOY_ERROR") == f"{where} {self.lives[where]}"
+
+    def action_masks(self):
+        if self._fails("mask"):
+            class NoPickle(Exception):
+                pass
+
+            raise NoPickle("the mask slipped")
+        return super().action_masks()
 
     def step(self, action):
-        self.life += 1
-        if self.life == int(os.environ.get("TOY_ERROR_AT", 0)):
+        if self._fails("step"):
             raise FloatingPointError("the ground is 100% gone")
         time.sleep(float(os.environ.get("TOY_SECONDS", 0)))
-        return super().step(action)
+        observation, reward, *rest = super().step(action)
+        return observation, reward * np.nan if self._fails("nan") else reward, *rest
 
     def get_state(self):
-        """All but the life."""
+        """All but the lives."""
         names = ("preference", "site", "steps", "full")
         return {"generator": self.np_random.bit_generator.state, **{name: getattr(self, name) for name in names}}
 

@@ -227,6 +227,14 @@ def test_foreign_folders_are_never_touched(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+def test_another_programs_folder_is_never_overwritten(tmp_path):
+    (tmp_path / "config.json").write_text('{"model_type": "bert"}')
+    (tmp_path / "checkpoint.pt").write_text("precious")
+    with pytest.raises(SystemExit, match="not a run's folder"):
+        make_run(tmp_path, overwrite=True)
+    assert (tmp_path / "checkpoint.pt").read_text() == "precious"
+
+
 def test_a_damaged_configuration_is_named(tmp_path):
     (tmp_path / "config.json").write_text("{")
     with pytest.raises(SystemExit, match="config.json is damaged"):

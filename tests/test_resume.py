@@ -15,11 +15,14 @@ import pytest
 from scripts import ROOT, run_script
 
 TOY = ("--env-id", "resumable_toy:resumable-toy-v0", "--total-timesteps", 6000, "--num-envs", 3, "--eval-episodes", 2)
-BOREAL = ("--total-timesteps", 2800, "--num-envs", 4, "--eval-episodes", 1, "--vectorization", "lockstep")
+BOREAL_ASYNC = ("--total-timesteps", 2800, "--num-envs", 4, "--eval-episodes", 1)
+BOREAL = ("--total-timesteps", 3200, "--num-envs", 16, "--eval-episodes", 1, "--vectorization", "lockstep")
+IMPORT_SECONDS = 3
 
 
 def arguments(script, common):
-    ppo = ("--rollout-steps", 600 if common is TOY else 400, "--update-epochs", 2) if "ppo" in script else ()
+    rollout = {TOY: 600, BOREAL_ASYNC: 400, BOREAL: 800}[common]
+    ppo = ("--rollout-steps", rollout, "--update-epochs", 2) if "ppo" in script else ()
     weights = ("--eval-weights", 0, 1) if script != "eupg_fixed_lambda" else ()
     return (*common, *ppo, *weights)
 
@@ -80,27 +83,36 @@ def assert_same_bytes(folder, other):
         assert (folder / name).read_bytes() == (other / name).read_bytes(), name
 
 
-@pytest.mark.parametrize("script, common", [
-    ("ppo_curriculum", TOY), ("ppo_gated", TOY), ("eupg_var_lambda", BOREAL), ("eupg_fixed_lambda", TOY),
-], ids=["ppo_curriculum-async", "ppo_gated-async", "eupg_var_lambda-lockstep", "eupg_fixed_lambda-async"])
-def test_killed_and_resumed_is_as_never_killed(script, common, tmp_path):
-    given, killed = arguments(script, common), tmp_path / "killed"
-    process = start(script, killed, *given)
-    dice = random.Random(script)
-    wait_for_rows(process, killed, 1)
-    while process.poll() is None and not (killed / "checkpoint.pt").exists():
-        time.sleep(0.005)
-    time.sleep(0.3 * dice.random())
-    os.kill(process.pid, signal.SIGKILL)
-    finish(process)
-    assert not (killed / "evaluation.csv").exists()
-    timing = (killed / "timing.csv").read_bytes()
-    resumed = start(script, killed, *given)
-    run_script(f"cleanrl_style/{script}.py", "--run-dir", tmp_path / "whole", *given)
-    code, out, err = finish(resumed)
-    assert code == 0 and "resuming at step" in out, err
-    assert_same_bytes(tmp_path / "whole", killed)
-    assert (killed / "timing.csv").read_bytes().startswith(timing)
+@pytest.mark.parametrize("script, common, moments", [
+    ("ppo_curriculum", TOY, "any"), ("ppo_curriculum", BOREAL_ASYNC, "checkpoint"),
+    ("ppo_gated", BOREAL, "checkpoint"), ("eupg_var_lambda", BOREAL, "any"),
+    ("eupg_fixed_lambda", TOY, "any checkpoint"),
+], ids=["ppo_curriculum-toy", "ppo_curriculum-async", "ppo_gated-lockstep", "eupg_var_lambda-lockstep",
+        "eupg_fixed_lambda-toy"])
+def test_killed_and_resumed_is_as_never_killed(script, common, moments, tmp_path):
+    """Killed at any moment (before anything is written, in training, in the evaluation), and after a checkpoint."""
+    given, killed, whole = arguments(script, common), tmp_path / "killed", tmp_path / "whole"
+    begun = time.monotonic()
+    run_script(f"cleanrl_style/{script}.py", "--run-dir", whole, *given)
+    seconds, dice, timing = time.monotonic() - begun, random.SystemRandom(), b""
+    for moment in moments.split():
+        process = start(script, killed, *given)
+        while moment == "checkpoint" and process.poll() is None and not (killed / "checkpoint.pt").exists():
+            time.sleep(0.005)
+        delay = dice.uniform(0, 0.3 * seconds) if moment == "checkpoint" else dice.uniform(0, seconds + IMPORT_SECONDS)
+        time.sleep(delay)
+        process.kill()
+        finish(process)
+        print(f"killed {delay:.2f} s after {moment}, of {seconds:.2f} s: {[path.name for path in killed.glob('*')]}")
+        if (killed / "timing.csv").exists():
+            earlier, timing = timing, (killed / "timing.csv").read_bytes()
+            assert timing.startswith(earlier[: earlier.rfind(b"\n") + 1])
+    unfinished = not (killed / "evaluation.csv").exists()
+    code, out, err = finish(start(script, killed, *given))
+    assert code == 0, err
+    if "checkpoint" in moments and unfinished:
+        assert "resuming at step" in out
+    assert_same_bytes(whole, killed)
 
 
 @pytest.fixture(scope="module")
@@ -187,16 +199,27 @@ def test_a_full_disk_leaves_the_old_checkpoint(interrupted, tmp_path):
     assert not list(folder.glob("*.tmp"))
 
 
-def test_an_error_in_a_worker_is_shown_and_ends_the_run(interrupted, tmp_path):
+@pytest.mark.parametrize("where, error", [
+    ("step 20", "FloatingPointError: the ground is 100% gone"),
+    ("mask 30", "NoPickle: the mask slipped"),
+    ("nan 20", "FloatingPointError: step gave the reward [nan nan]"),
+])
+def test_an_error_in_a_worker_is_shown_and_ends_the_run(interrupted, tmp_path, where, error):
     folder = copy(interrupted, tmp_path)
     old = (folder / "checkpoint.pt").read_bytes()
-    code, _, err = finish(start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_ERROR_AT="20"))
+    code, _, err = finish(start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_ERROR=where))
     assert code == 1
-    assert "FloatingPointError: the ground is 100% gone" in err and "error in environment 0" in err
+    assert error in err and "error in environment 0" in err
     last = err.strip().splitlines()[-1]
     assert last.startswith("error: environment 0 was ended by its error above")
     assert last.endswith("the same command goes on from step 2,400")
     assert (folder / "checkpoint.pt").read_bytes() == old
+
+
+def test_an_environment_that_cannot_be_made_in_a_worker_ends_the_run(tmp_path):
+    code, _, err = finish(start("ppo_gated", tmp_path / "run", *arguments("ppo_gated", TOY), TOY_ERROR="making 1"))
+    assert code == 1 and "FloatingPointError: no ground to stand on" in err
+    assert err.strip().splitlines()[-1] == "error: an environment could not be made: its error is above"
 
 
 def test_a_killed_worker_ends_the_run(interrupted, tmp_path):

@@ -9,7 +9,7 @@ import gymnasium as gym
 import tyro
 
 import boreal_env
-from analysis.protocol.evaluation import FIRST_EVALUATION_SEED, MODES
+from analysis.protocol.evaluation import FIRST_EVALUATION_SEED, MODES, as_mask
 
 MAX_ENVS = 1000
 # Arguments that change nothing in what a run computes.
@@ -138,7 +138,7 @@ def prepare(args) -> dict:
 def check_environment(args, env_kwargs: dict) -> None:
     """Exit with one line unless the environment exists and is of the kind that the scripts can handle."""
     allowed = f"allowed: {', '.join(MODES)}, or module:id of an environment of yours"
-    if args.env_id.count(":") > 1 or not args.env_id:
+    if args.env_id.count(":") > 1 or not all(args.env_id.split(":")):
         fail(f"--env-id {args.env_id!r}; {allowed}")
     try:
         env = gym.make(args.env_id, disable_env_checker=True, **env_kwargs)
@@ -151,8 +151,13 @@ def check_environment(args, env_kwargs: dict) -> None:
         fail(f"--env-id {args.env_id}: actions must be Discrete(25), not {actions}")
     if getattr(env.unwrapped, "reward_dim", None) != 2 or not hasattr(env.unwrapped, "action_masks"):
         fail(f"--env-id {args.env_id}: the environment needs reward_dim 2 and action_masks()")
-    if args.env_id not in MODES and env.reset(seed=0, options={"preference": 0.25})[0][0] != 0.25:
-        fail(f"--env-id {args.env_id}: reset(options={{'preference': w}}) must give w as observation 0")
+    if args.env_id not in MODES:
+        if env.reset(seed=0, options={"preference": 0.25})[0][0] != 0.25:
+            fail(f"--env-id {args.env_id}: reset(options={{'preference': w}}) must give w as observation 0")
+        try:
+            as_mask(env.unwrapped.action_masks(), args.env_id)
+        except ValueError as error:
+            fail(str(error))
     if getattr(args, "vectorization", "async") == "lockstep" and env.spec.vector_entry_point is None:
         fail(f"--vectorization lockstep: {args.env_id} has no vector entry point; async has no need of one")
     env.close()

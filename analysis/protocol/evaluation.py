@@ -34,7 +34,16 @@ def action_masks(envs: gym.vector.VectorEnv, observations: np.ndarray, env_id: s
     """Valid actions, bool (n, 25); those of the boreal environments follow from the observations alone."""
     if env_id in MODES:
         return boreal_env.action_masks(observations)
-    return np.stack(envs.call("action_masks"))
+    return np.stack([as_mask(answer, env_id) for answer in envs.call("action_masks")])
+
+
+def as_mask(answer, env_id: str) -> np.ndarray:
+    """What an environment's action_masks() gave, as bool (25,); ValueError if no action is valid."""
+    mask = np.asarray(answer).astype(bool)
+    if mask.shape != (25,) or not mask.any():
+        raise ValueError(f"--env-id {env_id}: action_masks() must give 25 values, at least one of them true, "
+                         f"not {np.array2string(np.asarray(answer), threshold=30)}")
+    return mask
 
 
 def final_info(infos: dict, i: int, keys) -> dict:
@@ -60,7 +69,7 @@ class PlainLoop(gym.vector.VectorEnv):
 
     def reset(self, *, seed: list[int], options: dict):
         """seed: one per environment; options: preference, one per environment."""
-        self.ended = np.zeros(self.num_envs, dtype=bool)
+        self.ended, self.answers = np.zeros(self.num_envs, dtype=bool), [None] * self.num_envs
         self.observations = np.stack([
             env.reset(seed=env_seed, options={"preference": preference})[0]
             for env, env_seed, preference in zip(self.envs, seed, options["preference"], strict=True)
@@ -80,8 +89,10 @@ class PlainLoop(gym.vector.VectorEnv):
         return self.observations.copy(), rewards, terminations, truncations, infos
 
     def call(self, name: str) -> tuple:
-        """Result of a method of every environment."""
-        return tuple(env.get_wrapper_attr(name)() for env in self.envs)
+        """Result of a method of every environment; of one whose episode has ended, its last answer."""
+        for i in np.flatnonzero(~self.ended):
+            self.answers[i] = self.envs[i].get_wrapper_attr(name)()
+        return tuple(self.answers)
 
     def close_extras(self, **kwargs) -> None:
         """Close every environment."""
@@ -116,6 +127,7 @@ def play(envs, env_id: str, policy, weights: np.ndarray, seeds: list[int], greed
     returns, reports = np.zeros((len(seeds), 2)), [{} for _ in seeds]
     playing = np.ones(len(seeds), dtype=bool)
     while playing.any():
+        observations = observations.astype(np.float32)
         probabilities = policy(observations, action_masks(envs, observations, env_id), returns)
         uniforms = None if greedy else np.array([generator.random() for generator in generators])
         actions = choose_actions(probabilities, uniforms)

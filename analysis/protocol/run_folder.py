@@ -124,6 +124,8 @@ class Run:
             fail(f"--run-dir {self.folder}: neither empty nor a run's folder (it has no config.json)")
         if occupied and not self.args.overwrite:
             self._compare(config_file)
+        elif occupied and is_foreign(config_file):
+            fail(f"--run-dir {self.folder}: not a run's folder (its config.json has no script and arguments)")
         self.folder.mkdir(parents=True, exist_ok=True)
         if not occupied:
             self._write_config()
@@ -302,6 +304,15 @@ class ByValue(pickle.Pickler):
 
 
 BY_VALUE = SimpleNamespace(__name__="by_value", Pickler=ByValue)  # for torch, a pickle module
+
+
+def is_foreign(config_file: Path) -> bool:
+    """Whether a config.json is another program's; a damaged one may be ours."""
+    try:
+        config = json.loads(config_file.read_text(encoding="utf-8"))
+    except ValueError:
+        return False
+    return not isinstance(config, dict) or not {"script", "arguments"} <= config.keys()
 
 
 def remove(path: Path) -> None:

@@ -1,5 +1,6 @@
 """The environments that a script trains on: made, saved, restored, and ended with nothing left behind."""
 
+import multiprocessing
 import os
 import signal
 import sys
@@ -7,7 +8,9 @@ import traceback
 from functools import partial
 
 import gymnasium as gym
+import numpy as np
 
+from analysis.protocol.arguments import fail
 from analysis.protocol.evaluation import MODES
 
 
@@ -15,7 +18,7 @@ class InWorker(gym.Wrapper):
     """An environment in a process of its own, which can be given a preference and a state to continue from.
 
     An error ends the process, after its traceback: passing it on through gymnasium would lose the traceback, or
-    hang if the error cannot be pickled.
+    hang if the error cannot be pickled. Numbers that are not finite are an error.
     """
 
     def __init__(self, env: gym.Env, index: int, preference: float | None = None):
@@ -26,31 +29,54 @@ class InWorker(gym.Wrapper):
         """As the environment's; with the fixed preference, if there is one."""
         if self.preference is not None:
             options = {**(options or {}), "preference": self.preference}
-        return self._or_end(self.env.reset, seed=seed, options=options)
+        return self._or_end(self._finite, self.env.reset, 1, seed=seed, options=options)
 
     def step(self, action):
         """As the environment's."""
-        return self._or_end(self.env.step, action)
+        return self._or_end(self._finite, self.env.step, 2, action)
+
+    def action_masks(self):
+        """As the environment's."""
+        return self._or_end(self.env.get_wrapper_attr("action_masks"))
 
     def get_state(self):
         """The environment's own get_state(), None if it has none."""
-        return self.unwrapped.get_state() if hasattr(self.unwrapped, "get_state") else None
+        return self._or_end(self.unwrapped.get_state) if hasattr(self.unwrapped, "get_state") else None
 
     def set_states(self, states) -> None:
         """Continue from this environment's state among those of all."""
         self._or_end(self.unwrapped.set_state, states[self.index])
 
+    @staticmethod
+    def _finite(function, number, *args, **kwargs):
+        """A call whose first results, observation and reward, must be finite."""
+        results = function(*args, **kwargs)
+        for name, value in zip(("observation", "reward")[:number], results, strict=False):
+            if not np.isfinite(value).all():
+                raise FloatingPointError(f"{function.__name__} gave the {name} {value}")
+        return results
+
     def _or_end(self, function, *args, **kwargs):
         try:
             return function(*args, **kwargs)
         except Exception:
-            print(f"error in environment {self.index}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
-            os._exit(1)
+            end_process(self.index)
+
+
+def end_process(index: int) -> None:
+    """End the process of an environment, after the traceback of the error that is being handled."""
+    print(f"error in environment {index}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
+    os._exit(1)
 
 
 def make_env(env_id: str, index: int, preference: float | None, env_kwargs: dict) -> gym.Env:
     """One environment of an AsyncVectorEnv."""
-    return InWorker(gym.make(env_id, disable_env_checker=True, **env_kwargs), index, preference)
+    try:
+        return InWorker(gym.make(env_id, disable_env_checker=True, **env_kwargs), index, preference)
+    except Exception:
+        if multiprocessing.parent_process() is None:  # AsyncVectorEnv makes one more to look at its spaces
+            raise
+        end_process(index)
 
 
 def make_training_envs(args, env_kwargs: dict) -> gym.vector.VectorEnv:
@@ -65,6 +91,8 @@ def make_training_envs(args, env_kwargs: dict) -> gym.vector.VectorEnv:
                 for number, handler in ((signal.SIGINT, signal.SIG_IGN), (signal.SIGTERM, signal.SIG_DFL))}
     try:
         return gym.vector.AsyncVectorEnv(make, autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
+    except (EOFError, ConnectionError):
+        fail("an environment could not be made: its error is above")
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
