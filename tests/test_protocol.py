@@ -274,3 +274,23 @@ def test_summary_of_a_run_is_a_picture_and_a_table(tmp_path, capsys):
     table = lines[next(i for i, line in enumerate(lines) if line.startswith("weight")):]
     assert [line.split()[0] for line in table[1:4]] == ["0.00", "0.50", "mean"]
     assert {len(line.split()) for line in table[:4]} == {7}
+
+
+@pytest.mark.parametrize("script", ["ppo_gated", "eupg_var_lambda"])
+def test_an_environment_need_not_mind_its_types(tmp_path, script):
+    rollout = ("--rollout-steps", 20) if script == "ppo_gated" else ()
+    run_script(f"cleanrl_style/{script}.py", "--env-id", "toy_env:loose-toy-v0", "--run-dir", tmp_path, "--num-envs", 2,
+               "--total-timesteps", 40, "--eval-episodes", 2, "--eval-weights", 0, 1, *rollout)  # fmt: skip
+    assert len(pd.read_csv(tmp_path / "evaluation.csv")) == 8
+
+
+def test_an_environment_without_a_valid_action_is_refused(tmp_path):
+    with pytest.raises(SystemExit, match="hopeless-toy-v0: .* at least one of them true"):
+        run_script("cleanrl_style/ppo_gated.py", "--env-id", "toy_env:hopeless-toy-v0", "--run-dir", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_budget_without_room_for_a_batch_is_refused(tmp_path):
+    with pytest.raises(SystemExit, match="--total-timesteps 8 has no room for a batch.*: 20 steps"):
+        run_script("cleanrl_style/eupg_var_lambda.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path,
+                   "--num-envs", 2, "--total-timesteps", 8)  # fmt: skip

@@ -62,6 +62,25 @@ class ToyEnv(gym.Env):
         return self._observation(), reward, self.steps == LENGTH, False, {}
 
 
+class LooseToyEnv(ToyEnv):
+    """As one would write it without a thought for types: observations of float64, masks of integers."""
+
+    def _observation(self):
+        return super()._observation().astype(float)
+
+    def action_masks(self):
+        return super().action_masks().astype(np.int8)
+
+
+class HopelessToyEnv(ToyEnv):
+    """With no valid action."""
+
+    def action_masks(self):
+        return np.zeros(25, dtype=bool)
+
+
 gym.register("toy-v0", entry_point="toy_env:ToyEnv")
 gym.register("toy-sites-v0", entry_point="toy_env:ToyEnv", kwargs={"with_site": True})
 gym.register("toy-centred-v0", entry_point="toy_env:ToyEnv", kwargs={"offset": 0.6})
+gym.register("loose-toy-v0", entry_point="toy_env:LooseToyEnv")
+gym.register("hopeless-toy-v0", entry_point="toy_env:HopelessToyEnv")
