@@ -122,6 +122,12 @@ def violations_percent(returns: np.ndarray) -> float:
     return 100 * float(_violates(changes).mean()) if len(changes) else np.nan
 
 
+def violations_or_ties_percent(returns: np.ndarray) -> float:
+    """The same, of pairs where carbon fails to rise or thaw fails to fall, ties included, as the paper words it [%]."""
+    changes = np.diff(np.asarray(returns, dtype=float), axis=0)
+    return 100 * float((changes * [-1, 1] >= 0).any(axis=-1).mean()) if len(changes) else np.nan
+
+
 def significant_violations_percent(evaluation: pd.DataFrame) -> float:
     """The same, counting only changes larger than their paired 95 % interval [%]."""
     _, returns = paired_returns(evaluation)

@@ -69,6 +69,14 @@ def test_monotone_front_has_no_violations_and_a_reversed_one_has_only_violations
     assert np.isnan(metrics.violations_percent(FRONT[:1]))
 
 
+def test_a_tie_violates_as_the_paper_words_it():
+    front = np.array([[0.0, 1.0], [1.0, 0.0], [1.0, -1.0], [2.0, -2.0]])
+    assert metrics.violations_percent(front) == 0
+    assert metrics.violations_or_ties_percent(front) == pytest.approx(100 / 3)
+    assert metrics.violations_or_ties_percent(front[::-1]) == 100
+    assert np.isnan(metrics.violations_or_ties_percent(front[:1]))
+
+
 def test_only_consistent_violations_are_significant():
     weights = [0.0, 0.5, 1.0]
     noise = np.array([-1.0, 1.0] * 10)[:, None]

@@ -13,8 +13,8 @@ from analysis import experiments, protocol, reproduce, runs
 from analysis.experiments import Job
 from cleanrl_style.ppo_gated import Args
 
-COUNTS = {"main": 37, "fixed": 15, "site": 30, "thaw": 12, "balanced": 20, "controls": 25, "variants": 30,
-          "mechanisms": 2, "single": 6, "difficulty": 2}
+COUNTS = {"main": 37, "fixed": 25, "site": 30, "thaw": 12, "balanced": 20, "controls": 25, "variants": 34,
+          "mechanisms": 2, "single": 6, "difficulty": 3}
 
 
 def test_experiments():

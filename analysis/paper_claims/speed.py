@@ -11,7 +11,7 @@ TITLE = "Time, memory and cost"
 WORKERS = 16
 # On demand, Linux, us-east-1: docs.aws.amazon.com, Amazon EC2 Auto Scaling user guide, prices by instance hour
 DOLLARS_PER_HOUR = 0.68
-FASTER = "Holds if ours takes no more than the paper's range: what is claimed is that it can be afforded."
+FASTER = "A cost: what is claimed is that it can be afforded, and ours being less does not speak against it."
 
 
 def measured(evidence, what: str) -> Number:
@@ -106,13 +106,13 @@ def memory(evidence):
                    below(ours, most("memory_per_env")))
 
 
-@claim("16 environments and the agent fit into 2 to 3 GB.", "Appendix, runtime", BENCHMARK, note=FASTER,
-       why="It follows from the memory of one worker.")
+@claim("16 environments and the agent fit into 2 to 3 GB.", "Appendix, runtime", BENCHMARK, 
+       note="The agent's process was not measured: its library alone takes more memory than sixteen environments.")
 def memory_of_all(evidence):
     worker, process = measured(evidence, "async worker"), measured(evidence, "this process")
     ours = Number((WORKERS * worker.value + process.value) / 1000)
     rows = [Row("16 workers and a process that has the physics [GB]", published("memory_16_envs_and_agent"), ours)]
-    return finding(rows, below(ours, most("memory_16_envs_and_agent")))
+    return Finding(rows, UNTESTABLE)
 
 
 @claim("A training costs one dollar of cloud computing (c5.4xlarge).", "Appendix, runtime", only("main"),

@@ -14,6 +14,7 @@ TITLE = "Lambda violations"
 COLUMNS = ROW_COLUMNS | {
     "pairs": "pairs of weights",
     "violations_percent": "violations %",
+    "violations_or_ties_percent": "violations and ties %",
     "paper_violations_percent": "violations % (paper)",
     "paper_detail_violations_percent": "violations % (paper's details)",
     "significant_violations_percent": "beyond their 95 % interval %",
@@ -27,6 +28,7 @@ def violations(one) -> dict:
     if len(front) < 2 or not np.ptp(front, axis=0).any():
         return {}
     row = {"pairs": len(front) - 1, "violations_percent": metrics.violations_percent(front),
+           "violations_or_ties_percent": metrics.violations_or_ties_percent(front),
            "noise_violations_percent": metrics.expected_violations_percent(front)}  # fmt: skip
     return row | {"significant_violations_percent": metrics.significant_violations_percent(one.evaluation)}
 
@@ -36,8 +38,8 @@ def make(results) -> pd.DataFrame:
     published = paper("monotonicity_violations", index_col="method").violations_percent
     details = paper("detailed_objectives").groupby("method")[["carbon_mean", "thaw_mean"]]
     details = details.apply(metrics.violations_percent)
-    names = [name for name in COLUMNS if name in ("pairs", "violations_percent", "significant_violations_percent",
-                                                  "noise_violations_percent")]  # fmt: skip
+    names = [name for name in COLUMNS if name in ("pairs", "violations_percent", "violations_or_ties_percent",
+                                                  "significant_violations_percent", "noise_violations_percent")]
     rows = []
     for key, replicates in results.rows.items():
         if not results.is_trained(key):
