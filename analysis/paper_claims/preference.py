@@ -48,8 +48,8 @@ def paper_change(script: str) -> tuple[float, float]:
 
 
 @claim("Curriculum PPO follows the preference.", "Figure 3d; table of detailed objectives", MAIN,
-       why="Both returns rise with the carbon weight: asked for thaw the agent plants less. Where no scale matters, "
-           "since each objective's advantages are normalised apart, the preference reaches the policy.")
+       why="Both returns rise with the carbon weight: asked for thaw the agent plants less. With each objective's "
+           "advantages normalised apart carbon follows the preference, and thaw more than without.")
 def curriculum_follows(evidence):
     carbon, thaw, answer = follows(evidence, "main", CURRICULUM)
     papers = paper_change(CURRICULUM)
@@ -81,8 +81,8 @@ def gated_does_not_follow(evidence):
 
 @claim("Thaw is hard for its asymmetry and physics, not for a difference in the rewards' magnitude.",
        "Appendix, reward function", only("main", "variants"),
-       why="With advantages normalised for each objective apart no magnitude matters, and the preference reaches the "
-           "policy.",
+       why="With advantages normalised for each objective apart no magnitude matters, and both returns follow the "
+           "preference.",
        note="The scale of `boreal-balanced-v0`, at which policies move both returns alike, does not make their noise "
             "alike.")
 def magnitude_does_not_matter(evidence):
