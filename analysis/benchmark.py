@@ -29,7 +29,7 @@ import boreal_env
 import sim
 from analysis import protocol
 from analysis.machine import machine
-from sim.block import LANES, compile_kernels
+from sim.block import HALF, LANES, compile_kernels
 from sim.draws import draw_year
 from sim.stands import available_cores
 from sim.state import DAYS
@@ -56,7 +56,8 @@ class Args:
     """Measures the speed of the simulator, of the environment and of its start."""
 
     only: tuple[str, ...] = ()
-    """sections to measure: episode, stands, steps, threads, environment, memory, start, training (all by default)"""
+    """sections to measure: episode, stands, steps, threads, environment, memory, start, training (all by default); the
+    others keep the figures that benchmark.csv has"""
     quick: bool = False
     """smaller sizes and fewer repeats, without the compilation: half a minute"""
     repeats: int | None = None
@@ -326,6 +327,15 @@ def run(args: Args) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
+def with_earlier(table: pd.DataFrame, path: Path) -> pd.DataFrame:
+    """The table, and the rows that a file has of sections which were not measured."""
+    if not path.exists():
+        return table
+    earlier = pd.read_csv(path, keep_default_na=False, na_values={"ratio": [""]})
+    both = pd.concat([table, earlier[~earlier.section.isin(table.section)]])
+    return both.sort_values("section", key=lambda names: names.map(list(SECTIONS).index), kind="stable")
+
+
 def short(value: float) -> str:
     """Three digits, without an exponent."""
     return f"{value:,.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
@@ -360,11 +370,12 @@ def main(args: Args) -> None:
         protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
     facts = machine()
     print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-    compile_kernels(1)
-    compile_kernels(LANES)
-    table = run(args)
+    for number in (1, HALF, LANES):
+        compile_kernels(number)
+    path = args.output_dir / "benchmark.csv"
+    table = with_earlier(run(args), path)
     text = markdown(facts, table)
-    with protocol.replacing(args.output_dir / "benchmark.csv") as file:
+    with protocol.replacing(path) as file:
         table.to_csv(file, index=False, float_format=protocol.FLOAT_FORMAT, lineterminator="\n")
     with protocol.replacing(args.output_dir / "benchmark.md") as file:
         file.write(text.encode())

@@ -59,6 +59,19 @@ def test_a_bad_argument_is_refused(arguments, tmp_path):
         run_script("analysis/benchmark.py", *arguments, "--output-dir", tmp_path)
 
 
+def test_sections_that_are_not_measured_keep_their_rows(tmp_path):
+    path = tmp_path / "benchmark.csv"
+    rows = [("episode", "a", "s", 1.0, 1.0, 1.0, 1.0, 1, "5-7 s"),
+            ("stands", "b", "ns per stand", 2.0, 2.0, 2.0, np.nan, 1, ""),
+            ("threads", "c", "stand-years per s", 3.0, 3.0, 3.0, 1.0, 1, "")]  # fmt: skip
+    pd.DataFrame(rows, columns=benchmark.COLUMNS).to_csv(path, index=False)
+    new = pd.DataFrame([("stands", "d", "ns per stand", 4.0, 4.0, 4.0, 1.0, 1, "")], columns=benchmark.COLUMNS)
+    both = benchmark.with_earlier(new, path)
+    assert both.what.tolist() == ["a", "d", "c"] and both.paper.tolist() == ["5-7 s", "", ""]
+    assert benchmark.with_earlier(new, tmp_path / "none.csv") is new
+    assert "| a " in benchmark.markdown({"cores": "2"}, both)
+
+
 def test_the_machine_is_named():
     facts = machine()
     assert {"processor", "cores", "python", "numba", "numpy"} <= set(facts)
