@@ -176,7 +176,7 @@ def main(args: Args) -> None:
         return not job.is_study and any(job.made(config) for config in configs)
 
     print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-    for number in (1, 32):
+    for number in (1, 8, 32):
         boreal_env.warm_up(number)
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(available_cores()))
     signal.signal(signal.SIGTERM, signal.default_int_handler)
