@@ -28,6 +28,7 @@ HEADING = (
     "| {what} | seeds | carbon, weight 0 | weight 1 | thaw, weight 0 | weight 1 | scalarised | scalarised gain "
     "| gain hypervolume | scalarised, the paper |\n|---|---|---|---|---|---|---|---|---|---|\n"
 )
+NOT_COMPARED = ("--thaw-formulation", "--total-timesteps", "--site-seed")  # rows of other rewards, budgets, sites
 COLUMNS = ("carbon_0", "carbon_1", "thaw_0", "thaw_1", "scalarized", "gain_scalarized", "gain_hypervolume")
 
 
@@ -124,9 +125,9 @@ def section(results: Results, name: str) -> str:
         return distances(results)
     rows = []
     if name == "all":
-        for script in (*experiments.METHODS, *experiments.HEURISTICS):
+        for script in (*experiments.TRAINED, *experiments.HEURISTICS):
             rows += named(script, rows_of(results, script, GENERALIST))
-        rows = [row for row in rows if "thaw-formulation" not in row[0] and "total-timesteps" not in row[0]]
+        rows = [row for row in rows if not any(flag in row[0] for flag in NOT_COMPARED)]
     elif name == "heuristics":
         for script in experiments.HEURISTICS:
             rows += named(script, rows_of(results, script))
