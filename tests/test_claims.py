@@ -12,6 +12,7 @@ from analysis import claims, experiments
 from analysis.paper_claims import asymmetry, curriculum, environment, paper_itself, performance, preference, speed
 from analysis.paper_claims.claim import (
     CONTRADICTS,
+    LEAST,
     NO_RUNS,
     NOT_REPRODUCED,
     REPRODUCED,
@@ -333,3 +334,9 @@ def test_prose_has_no_numbers():
         for claim in theme.CLAIMS:
             prose = re.sub(r"`[^`]*`", "", claim.why + claim.note)  # but in names of files and environments
             assert not re.search(r"\d", prose), claim.statement
+
+
+def test_least_effect_is_a_quarter_of_the_best_constant_plans_gain():
+    table = pd.read_csv(ROOT / "results" / "tables" / "main_results.csv")
+    best = table[(table.method == "best_constant_mix") & (table.environment == GENERALIST)].iloc[0]
+    assert best.gain_scalarized / 4 == pytest.approx(LEAST, abs=0.05)

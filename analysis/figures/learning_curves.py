@@ -23,8 +23,8 @@ from analysis.studies.training_gains import gains
 SIZE = (7.2, 4.8)
 PARTS = 20  # of the training; fewer than of a learning curve, as a part of the episodes has a gain
 CAPTION = ("Sums over 50 years: (a-c) returns of training episodes, (d-f) less those of zero change on the same "
-           f"episodes; {SEEDS_95}. Dashed, dotted: fixed strategies in the evaluation, mean over weights; the best "
-           "constant plan is that of each weight.")  # fmt: skip
+           f"episodes; {SEEDS_95}. Dashed, dotted: fixed strategies, their mean gain in the evaluation, in (a-c) added "
+           "to zero change's mean return in training; the best constant plan is that of each weight.")  # fmt: skip
 BEST = "Best constant plan"
 QUANTITIES = {"carbon": "carbon", "thaw": "thaw", "scalarized": "scalarised"}
 
@@ -33,7 +33,7 @@ def draw(figure, results) -> None:
     """Carbon, thaw and their scalarisation: returns above, gains below."""
     axes = panels(figure, 2, 3, [f"{title} {kind}" for kind in ("return", "gain") for title in QUANTITIES.values()])
     nothing = results.study("training_gains")
-    levels = baselines(results)
+    levels = [] if nothing is None else baselines(results, nothing)
     for k, name in enumerate(QUANTITIES):
         for script, title in methods(axes[k], results):
             learning_curve(axes[k], results.of("main", script), f"{name}_return", COLOURS[script], title)
@@ -44,9 +44,8 @@ def draw(figure, results) -> None:
                 no_data(ax, "python analysis/studies/training_gains.py")
                 continue
             for label, colour, values in levels:
-                if f"{name}_{kind}" in values:
-                    style = ":" if label == BEST else "--"
-                    ax.axhline(values[f"{name}_{kind}"], color=colour, linestyle=style, linewidth=0.9, label=label)
+                style = ":" if label == BEST else "--"
+                ax.axhline(values[f"{name}_{kind}"], color=colour, linestyle=style, linewidth=0.9, label=label)
             finish(ax, legend=False, ylabel=f"{QUANTITIES[name]} {kind}", **STEPS)
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
@@ -65,27 +64,30 @@ def gain_curve(ax, replicates, nothing, column: str, colour) -> None:
     band(ax, x[known], curves[:, known], colour, None)
 
 
-def baselines(results) -> list[tuple]:
-    """(title, colour, quantity -> level) of the fixed strategies and of the best constant plan."""
-    levels = []
+def baselines(results, nothing) -> list[tuple]:
+    """(title, colour, quantity -> level) of the fixed strategies and of the best constant plan.
+
+    nothing : the study's table. The evaluation's sites are few, and returns differ between sites far more than between
+    strategies, so that a strategy's level among the training's returns is its gain over zero change's mean there.
+    """
     evaluated = [(TITLES[script], COLOURS[script], one.evaluation) for script in HEURISTICS
                  for one in results.of("main", script)]  # fmt: skip
+    zero = next((evaluation for title, _, evaluation in evaluated if title == TITLES["zero_change"]), None)
+    if zero is None:
+        return []
     plans = results.study("constant_plans")
-    if plans is not None and evaluated:
+    if plans is not None:
         env_id = results.first_job("main", METHODS[0]).env_id
-        weights = sorted(evaluated[0][2].preference.unique())
+        weights = sorted(zero.preference.unique())
         best = constant_plans.as_evaluation(plans[plans.env_id == env_id], weights, best=True)
         evaluated.append((BEST, "#000000", best))
-    zero = next((evaluation for title, _, evaluation in evaluated if title == TITLES["zero_change"]), None)
+    carbon, thaw = nothing.carbon_return.mean(), nothing.thaw_return.mean()
+    start = {"carbon": carbon, "thaw": thaw, "scalarized": (carbon + thaw) / 2}  # a training's mean weight is 1/2
+    levels = []
     for title, colour, evaluation in evaluated:
-        values = level(evaluation, "return")
-        if zero is not None:
-            values |= level(metrics.gains(evaluation, zero), "gain")
-        levels.append((title, colour, values))
+        gained = metrics.gains(evaluation, zero)
+        gain = {"carbon": gained.carbon_return.mean(), "thaw": gained.thaw_return.mean(),
+                "scalarized": metrics.mean_scalarized(gained)}  # fmt: skip
+        levels.append((title, colour, {f"{name}_gain": gain[name] for name in gain}
+                       | {f"{name}_return": start[name] + gain[name] for name in gain}))
     return levels
-
-
-def level(evaluation, kind: str) -> dict[str, float]:
-    """Means over weights and episodes of carbon, thaw and their scalarisation."""
-    carbon, thaw = evaluation.carbon_return.mean(), evaluation.thaw_return.mean()
-    return {f"carbon_{kind}": carbon, f"thaw_{kind}": thaw, f"scalarized_{kind}": metrics.mean_scalarized(evaluation)}

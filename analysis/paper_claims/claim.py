@@ -12,7 +12,7 @@ UNDECIDED, NO_RUNS = "undecided", "no runs yet"
 VERDICTS = (REPRODUCED, NOT_REPRODUCED, CONTRADICTS, UNTESTABLE, UNDECIDED, NO_RUNS)
 
 SEEDS = "training seeds"
-FEWEST_SEEDS = 5  # for a verdict: a 95 % bootstrap interval over three covers 73 % of normal values, over five 89 %
+FEWEST_SEEDS = 5  # for a verdict: a 95 % bootstrap interval over three covers 75 % of the time, over five 91 %
 #: The smallest effect on a return that counts as one: a quarter of what the best constant plan of each weight gains
 #: over doing nothing (results/tables/main_results.md).
 LEAST = 0.4

@@ -25,6 +25,7 @@ from analysis.tables.lambda_violations import violations
 
 TITLE = "Following the preference"
 MAIN = only("main")
+NO_ENTROPY = {"ent_coef": 0.0, "per_objective_advantages": None}  # None: without this flag
 APART = {"ent_coef": 0.0, "per_objective_advantages": True}
 
 
@@ -61,10 +62,9 @@ def curriculum_follows(evidence):
 
 def apart_rows(evidence) -> list[Row]:
     """Lines of gated PPO without entropy bonus, and then with advantages of each objective apart too."""
-    without = {"ent_coef": 0.0}
     return [Row(f"{name}, PPO Gated with {what}", "", optional(lambda name=name, flags=flags: seeds(
                 change(evidence, name, "variants", GATED, **flags))))
-            for what, flags in (("`--ent-coef 0`", without | {"per_objective_advantages": None}),
+            for what, flags in (("`--ent-coef 0`", NO_ENTROPY),
                                 ("`--ent-coef 0 --per-objective-advantages`", APART))
             for name in ("carbon", "thaw")]  # fmt: skip
 

@@ -197,11 +197,8 @@ def gradient_dominance(evidence):
 @claim("Curriculum PPO makes for longer growing seasons.", "Section 4.4", MAIN,
        why="The growing season is the days on which the air is warm enough, and no stand changes the weather.")
 def longer_season(evidence):
-    def season(script):
-        table = evidence.by_seed(mean_season, "main", script)
-        return table.days
-
-    apart = seeds(season(CURRICULUM) - season("zero_change").iloc[0])
+    days = {script: evidence.by_seed(mean_season, "main", script).days for script in (CURRICULUM, "zero_change")}
+    apart = seeds(days[CURRICULUM] - days["zero_change"].iloc[0])
     return finding([Row("growing season less that of zero change, same episodes [days]", "above 0", apart)],
                    above(apart, least=1.0, what="the difference"))
 
