@@ -263,7 +263,7 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
     episodes are in it; policy : what a rollout takes beside the environment, mostly the forward pass. The whole run
     is put together from these.
     """
-    steps = 2 * ROLLOUT if args.quick else 3 * ROLLOUT
+    steps = ROLLOUT if args.quick else 3 * ROLLOUT
     pool = stack.enter_context(ThreadPoolExecutor(available_cores()))
 
     def measure(kind, number, groups):
