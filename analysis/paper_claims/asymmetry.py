@@ -19,7 +19,7 @@ from analysis.paper_claims.claim import (
     finding,
     within,
 )
-from analysis.paper_claims.evidence import VARIANCE, difference, first_and_last, mean_of, only, seeds
+from analysis.paper_claims.evidence import VARIANCE, difference, first_and_last, mean_of, only, optional, seeds
 from analysis.studies.constant_plans import as_evaluation
 from analysis.tables.common import GENERALIST
 
@@ -111,9 +111,22 @@ def asymmetry_on_single_sites(evidence):
     unit = "last less first tenth of training, in standard deviations of the first"
     rows = [Row(f"carbon: {unit}", "rises", mean_of(carbon, "sites")),
             Row(f"thaw: {unit}", "hardly rises", mean_of(thaw, "sites")), Row("carbon less thaw", "above 0", apart)]
+    rows += [Row(f"{name} over zero change in the evaluation, agents of {name} alone", "",
+                 optional(lambda weight=weight: mean_of(own_gains(evidence, weight), "sites")))
+             for name, weight in (("carbon", CARBON), ("thaw", THAW))]  # fmt: skip
     answer = all_of(above(apart, what="the difference"),
                     below(mean_of(thaw, "sites"), 1.0, what="thaw's progress"))  # fmt: skip
     return Finding(rows, UNDECIDED, answer.rule) if len(common) < FEWEST_SITES else finding(rows, answer)
+
+
+def own_gains(evidence, weight: float) -> pd.Series:
+    """Gain over zero change in what an agent of one weight was trained for, by the site that it was trained on."""
+    tables = {one.runs[0].arguments["site_seed"]: one.gains for one in evidence.replicates("site", "eupg_fixed_lambda")
+              if one.gains is not None}  # fmt: skip
+    if not tables:
+        raise Missing("zero_change on these sites")
+    return pd.Series({site: table[table.preference == weight][OBJECTIVE[weight]].mean()
+                      for site, table in tables.items()})
 
 
 def at_the_end(evidence, weight: float, column: str) -> pd.Series:
