@@ -48,6 +48,8 @@ class Args:
     """discount factor"""
     utility: Literal["total", "future"] = "total"
     """what weights an action's gradient: utility of the episode's whole return, accrued and future; or of the future"""
+    baseline: Literal["none", "others"] = "none"
+    """what is subtracted from a return: nothing, by the definition, or the mean of the batch's other episodes"""
 
     # Evaluation and output
     eval_episodes: int = 100
@@ -102,17 +104,20 @@ def policy_input(observations, accrued_returns):
     return torch.from_numpy(np.hstack([observations, accrued_returns / 50]).astype(np.float32))
 
 
-def compute_utilities(rewards, preferences, gamma, which):
+def compute_utilities(rewards, preferences, gamma, which, baseline="none"):
     """Utility (steps, n) that weights each step's gradient, of n episodes with rewards (steps, n, 2).
 
     The utility of a return is its scalarisation by the episode's preference (n,). "total" is that of the whole
     return, accrued before the step and future, the same for all steps; "future" that of what comes from the step on.
+    "others" takes it less the other episodes' mean, which changes no expected gradient: it knows nothing of the action.
     """
     to_go = np.zeros_like(rewards)
     future = np.zeros(rewards.shape[1:])
     for t in reversed(range(len(rewards))):
         to_go[t] = future = rewards[t] + gamma * future
     returns = to_go if which == "future" else np.broadcast_to(to_go[0], to_go.shape)
+    if baseline == "others":
+        returns = returns - (returns.sum(axis=1, keepdims=True) - returns) / (returns.shape[1] - 1)
     return protocol.scalarize(returns[..., 0], returns[..., 1], preferences)
 
 
@@ -128,6 +133,8 @@ if __name__ == "__main__":
     episode_columns = protocol.EPISODE_COLUMNS
     update_columns = ("iteration", "global_step", "policy_loss", "entropy", "gradient_norm", "utility_mean",
                       "utility_std")
+    if args.baseline == "others" and args.num_envs == 1:
+        protocol.fail("--baseline others is the mean of a batch's other episodes: --num-envs 1 has none")
 
     with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
         # TRY NOT TO MODIFY: seeding
@@ -207,7 +214,7 @@ if __name__ == "__main__":
             update_start = time.perf_counter()
 
             # Optimizing the policy: one step of gradient ascent
-            utilities = compute_utilities(np.stack(rewards), preferences, args.gamma, args.utility)
+            utilities = compute_utilities(np.stack(rewards), preferences, args.gamma, args.utility, args.baseline)
             loss, entropy = eupg_loss(agent, torch.cat(obs), torch.cat(masks), torch.cat(actions),
                                       torch.from_numpy(utilities.ravel().astype(np.float32)))
             optimizer.zero_grad()

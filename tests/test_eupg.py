@@ -70,6 +70,23 @@ def test_gradient_is_that_of_a_numpy_implementation(episode, which, gamma):
         np.testing.assert_allclose(parameter.grad.numpy(), gradient, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize("which", ["total", "future"])
+def test_others_baseline_leaves_each_episode_out_of_its_own(which):
+    rewards = np.arange(12.0).reshape(2, 3, 2) ** 2  # 2 steps, 3 episodes
+    preferences = np.array([0.0, 0.5, 1.0])
+    returns = rewards[::-1].cumsum(axis=0)[::-1] if which == "future" else np.stack([rewards.sum(axis=0)] * 2)
+    for i, preference in enumerate(preferences):
+        excess = returns[:, i] - returns[:, [k for k in range(3) if k != i]].mean(axis=1)
+        expected = preference * excess[:, 0] + (1 - preference) * excess[:, 1]
+        utilities = compute_utilities(rewards, preferences, 1.0, which, "others")[:, i]
+        np.testing.assert_allclose(utilities, expected, rtol=1e-12)
+
+
+def test_others_baseline_needs_others():
+    with pytest.raises(SystemExit, match="--baseline others .* --num-envs 1 has none"):
+        run_script("cleanrl_style/eupg_fixed_lambda.py", "--baseline", "others", "--num-envs", 1)
+
+
 def test_masked_actions_have_no_probability_and_the_others_all_of_it(episode):
     x, masks, *_ = episode
     probabilities = make_agent().get_distribution(torch.tensor(x), torch.tensor(masks)).probs.detach().numpy()

@@ -111,18 +111,19 @@ def asymmetry_on_single_sites(evidence):
     unit = "last less first tenth of training, in standard deviations of the first"
     rows = [Row(f"carbon: {unit}", "rises", mean_of(carbon, "sites")),
             Row(f"thaw: {unit}", "hardly rises", mean_of(thaw, "sites")), Row("carbon less thaw", "above 0", apart)]
-    rows += [Row(f"{name} over zero change in the evaluation, agents of {name} alone", "",
-                 optional(lambda weight=weight: mean_of(own_gains(evidence, weight), "sites")))
+    rows += [Row(f"{name} over zero change in the evaluation, agents of {name} alone{what}", "",
+                 optional(lambda weight=weight, flags=flags: mean_of(own_gains(evidence, weight, **flags), "sites")))
+             for what, flags in (("", {}), (", `--baseline others`", {"baseline": "others"}))
              for name, weight in (("carbon", CARBON), ("thaw", THAW))]  # fmt: skip
     answer = all_of(above(apart, what="the difference"),
                     below(mean_of(thaw, "sites"), 1.0, what="thaw's progress"))  # fmt: skip
     return Finding(rows, UNDECIDED, answer.rule) if len(common) < FEWEST_SITES else finding(rows, answer)
 
 
-def own_gains(evidence, weight: float) -> pd.Series:
+def own_gains(evidence, weight: float, **flags) -> pd.Series:
     """Gain over zero change in what an agent of one weight was trained for, by the site that it was trained on."""
-    tables = {one.runs[0].arguments["site_seed"]: one.gains for one in evidence.replicates("site", "eupg_fixed_lambda")
-              if one.gains is not None}  # fmt: skip
+    tables = {one.runs[0].arguments["site_seed"]: one.gains
+              for one in evidence.replicates("site", "eupg_fixed_lambda", **flags) if one.gains is not None}
     if not tables:
         raise Missing("zero_change on these sites")
     return pd.Series({site: table[table.preference == weight][OBJECTIVE[weight]].mean()
