@@ -191,7 +191,7 @@ def controls(seeds) -> list[Job]:
 
 
 def variants(seeds) -> list[Job]:
-    """Gated PPO with one choice changed, or those that help thaw together; EUPG with other batches, future rewards."""
+    """Gated PPO with one choice changed, or those that help thaw together; EUPG with other batches and weights."""
     changes = (
         ("ppo_gated", {"reward_scales": REWARD_SCALES}),
         ("ppo_gated", {"per_objective_advantages": True}),
@@ -202,6 +202,7 @@ def variants(seeds) -> list[Job]:
         ("ppo_gated", {"learning_rate": 1e-3}),
         ("eupg_var_lambda", {"num_envs": 32}),
         ("eupg_var_lambda", {"utility": "future"}),
+        ("eupg_var_lambda", {"baseline": "others"}),
         ("eupg_var_lambda", {"num_envs": 1}),
     )
     judged = ({"ent_coef": 0.0, "per_objective_advantages": True}, {"hide_site": True})  # by analysis/paper_claims

@@ -31,7 +31,7 @@ from analysis.paper_claims.evidence import Evidence
 from analysis.results import Results
 from analysis.studies import stored
 from analysis.studies.constant_plans import PLANTING
-from analysis.studies.mechanism_pairs import MEANS, PAIRS
+from analysis.studies.mechanism_pairs import MEANS, OFF, PAIRS
 
 GENERALIST = "boreal-generalist-v0"
 ROOT = Path(__file__).parents[1]
@@ -266,10 +266,15 @@ def write_everything(folder, jobs):
         if job.trains:
             training_episodes(flags.get("total_timesteps", 300_000), number).to_csv(run / "episodes.csv", index=False)
     studies = folder / "studies"
-    names = ["carbon_return", "thaw_return", *MEANS]
-    pairs = pd.DataFrame(generator.normal(size=(4 * len(PAIRS), 2 * len(names))),
+    names = ["carbon_return", "thaw_return", "thaw_clipped_years", *MEANS]
+    cases = pd.DataFrame([(pair, off) for pair in PAIRS for off in OFF] * 4, columns=["pair", "off"])
+    pairs = pd.DataFrame(generator.normal(size=(len(cases), 2 * len(names))),
                          columns=[f"{side}_{name}" for side in ("lower", "upper") for name in names])
-    stored.write(studies / "mechanism_pairs.csv", pairs.assign(pair=[*PAIRS] * 4), {})
+    stored.write(studies / "mechanism_pairs.csv", cases.join(pairs), {})
+    of_sites = pd.DataFrame([(site, action, *generator.normal(size=2)) for site in experiments.SITE_SEEDS
+                             for action in range(25)],
+                            columns=["site_seed", "action", "carbon_return", "thaw_return"])
+    stored.write(studies / "constant_plans_of_sites.csv", of_sites, {})
     plans = pd.DataFrame([(env, action, seed, *generator.normal(size=2)) for env in (GENERALIST, "boreal-balanced-v0")
                           for action in PLANTING for seed in (0, 1)],
                          columns=["env_id", "action", "seed", "carbon_return", "thaw_return"])

@@ -11,7 +11,7 @@ from analysis import experiments, make_tables, results
 from analysis.results import Results
 from analysis.studies import stored
 from analysis.studies.signal_to_noise import CONTRASTS
-from analysis.tables import curriculum_selection, learning_difficulty, physical_conflicts
+from analysis.tables import curriculum_selection, growing_season_correlations, learning_difficulty, physical_conflicts
 
 MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")
 
@@ -74,8 +74,11 @@ def test_strategies_and_fluxes(tables):
 def test_season_violations_runtime_details(tables):
     season = read(tables, "growing_season_correlations", ["method", "variable"]).loc["ppo_curriculum"]
     # returns of both episodes differ by 6 at each weight, whose means differ: r = cov / (sd sd) = 30 / sqrt(100 * 29/3)
-    assert season.r.to_dict() == pytest.approx({"thaw_return": 30 / np.sqrt(100 * 29 / 3), "latent_heat_mj_m2": 1,
-                                                "ground_shortwave_mj_m2": -1})
+    assert season.r_warm.to_dict() == pytest.approx({"thaw_return": 30 / np.sqrt(100 * 29 / 3), "latent_heat_mj_m2": 1,
+                                                     "ground_shortwave_mj_m2": -1})
+    # there are two sites, so the season of leaves orders them as the warm days do, or the other way round
+    first, second = (growing_season_correlations.season_of_leaves(seed) for seed in (11, 12))
+    np.testing.assert_allclose(season.r, np.sign(second - first) * season.r_warm)
     assert season.paper_r.tolist() == [0.65, 0.82, -0.75]
     violations = read(tables, "lambda_violations", ["method", "environment", "setting"]).loc[MAIN]
     assert (violations.pairs, violations.violations_percent, violations.paper_violations_percent) == (2, 0, 50)
@@ -270,13 +273,18 @@ def test_physical_conflicts():
     for name in physical_conflicts.EFFECTS:
         table |= {f"lower_{name}": 0.0, f"upper_{name}": [1.0, 2.0, 3.0, 2.0]}
     table["upper_thaw_return"] = [-1.0, -1.2, -0.8, 0.2]
-    tables = [pd.DataFrame(table).assign(pair=name) for name in physical_conflicts.PAIRS]
+    table |= {"lower_thaw_clipped_years": [0, 0, 1, 0], "upper_thaw_clipped_years": [0, 2, 1, 0]}
+    tables = [pd.DataFrame(table).assign(pair=name, off="all on") for name in physical_conflicts.PAIRS]
+    table["upper_thaw_return"] = 4.0
+    tables += [pd.DataFrame(table).assign(pair=name, off=off) for name in physical_conflicts.PAIRS
+               for off in ("interception", "moss", "fire")]  # fmt: skip
     row = physical_conflicts.make(Studies(pd.concat(tables))).set_index("change").loc[pair]
     assert (row.sites, row.carbon_return, row.thaw_return) == pytest.approx((4, 2, -0.7))
     half_width = 3.182446 * np.sqrt(2 / 3) / 2  # t of 3 degrees of freedom, sd of the four, root of four
     assert (row.carbon_return_low, row.carbon_return_high) == pytest.approx((2 - half_width, 2 + half_width))
     assert row.conflict == "unclear"  # thaw's interval is 0.98 on either side
     assert row.share_of_sites_in_conflict == 75 and row.paper_conflict == "yes (direct)"
+    assert (row.clipped_sites, row.thaw_without_interception, row.carbon_without_fire) == (2, 4, 2)
 
 
 def test_verdict():

@@ -8,15 +8,23 @@ from analysis.studies import constant_plans, mechanism_pairs, site_warming, stor
 
 
 def test_a_pair_differs_in_its_one_thing(monkeypatch):
-    chosen = [name for name in mechanism_pairs.PAIRS if name.startswith(("conifer", "growing season by"))]
+    chosen = [name for name in mechanism_pairs.PAIRS if name.startswith(("conifer fraction", "growing season by"))]
     monkeypatch.setattr(mechanism_pairs, "PAIRS", {name: mechanism_pairs.PAIRS[name] for name in chosen})
-    table = mechanism_pairs.study(sites=2, years=2).set_index("pair")
+    monkeypatch.setattr(mechanism_pairs, "OFF", (mechanism_pairs.ALL_ON, "interception"))
+    both = mechanism_pairs.study(sites=2, years=2)
+    assert both.groupby(["off", "pair"]).size().tolist() == [2] * 4
+    table = both[both.off == mechanism_pairs.ALL_ON].set_index("pair")
     climate, conifers = (table.loc[name] for name in chosen)
     assert (climate.upper_growing_season_days > climate.lower_growing_season_days).all()
     # the same weather: the air is the same whatever stands in it
     assert (conifers.upper_growing_season_days == conifers.lower_growing_season_days).all()
     assert (conifers.upper_winter_albedo < conifers.lower_winter_albedo).all()
     assert table.site_seed.nunique() == 2
+    np.testing.assert_array_equal(
+        mechanism_pairs.effects(both, chosen[0], "peak_swe_mm"), climate.upper_peak_swe_mm - climate.lower_peak_swe_mm
+    )
+    bare = both[both.off == "interception"].set_index("pair").loc[chosen[0]]
+    assert (bare.lower_peak_swe_mm > climate.lower_peak_swe_mm).all()  # no tree catches snow
 
 
 def test_constant_plans_as_an_evaluation():

@@ -118,7 +118,8 @@ def gain(evidence, script: str, objective: str) -> pd.Series:
 
 
 @claim("PPO Gated farms carbon and fails to protect permafrost.", "Section 4.4; table of learned strategies", MAIN,
-       why="Planting gains in both objectives here.")
+       why="Planting gains in both objectives on average here: most sites have wind enough to thin what snow trees "
+           "catch (see the claim on more stems).")
 def gated_fails_permafrost(evidence):
     carbon, thaw = (seeds(gain(evidence, GATED, f"{name}_return")) for name in ("carbon", "thaw"))
     rows = [Row("carbon gain over zero change", "above 0", carbon), Row("thaw gain over zero change", "below 0", thaw)]

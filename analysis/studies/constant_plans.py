@@ -2,22 +2,26 @@
 
     python analysis/studies/constant_plans.py
 
-Planting 50 or 100 stems/ha a year at each of the five mixes wherever there is room, on the evaluation's episodes.
-Leaves results/studies/constant_plans.csv, one row an episode.
+Planting 50 or 100 stems/ha a year at each of the five mixes wherever there is room, on the evaluation's episodes; and
+every action every year on the single sites of the experiments, where all episodes are one. Leaves
+results/studies/constant_plans.csv and constant_plans_of_sites.csv, one row an episode.
 """
 
+import contextlib
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
+import gymnasium as gym
 import numpy as np
 import pandas as pd
 
+import boreal_env
 import sim
-from analysis import protocol, results
+from analysis import experiments, protocol, results
 from analysis.studies import open_loop, stored
 from analysis.studies.measure_balance import where_valid
 
-ENVIRONMENTS = ("boreal-generalist-v0", "boreal-balanced-v0")
+ENVIRONMENTS, ONE_SITE = ("boreal-generalist-v0", "boreal-balanced-v0"), "boreal-site-specific-v0"
 PLANTING = tuple(range(15, 25))  # +50 and +100, five mixes each
 DENSE_CONIFER = 24
 
@@ -45,6 +49,28 @@ def study(env_id: str, episodes: int) -> pd.DataFrame:
     return pd.concat(tables)[["env_id", "action", "episode", "seed", "carbon_return", "thaw_return"]]
 
 
+def study_of_sites(seeds) -> pd.DataFrame:
+    """Returns of every action every year where it can be carried out, on single sites."""
+    actions, tables = np.arange(sim.management.NUM_ACTIONS), []
+    for seed in seeds:
+        with contextlib.closing(gym.make_vec(ONE_SITE, num_envs=len(actions), site_seed=seed)) as envs:
+            observations, _ = envs.reset(seed=0)  # the preference alone comes of it
+            returns = np.zeros((len(actions), 2))
+            for _ in range(boreal_env.DEFAULT_YEARS):
+                valid = protocol.action_masks(envs, observations, ONE_SITE)[actions, actions]
+                observations, rewards, *_ = envs.step(np.where(valid, actions, boreal_env.NO_CHANGE))
+                returns += rewards
+        tables.append(pd.DataFrame({"site_seed": seed, "action": actions, "carbon_return": returns[:, 0],
+                                    "thaw_return": returns[:, 1]}))  # fmt: skip
+    return pd.concat(tables, ignore_index=True)
+
+
+def best_gains(plans: pd.DataFrame, objective: str) -> pd.Series:
+    """By site, what the best plan for an objective has over no change; plans : of `study_of_sites`."""
+    returns = plans.pivot(index="action", columns="site_seed", values=objective)
+    return returns.max() - returns.loc[boreal_env.NO_CHANGE]
+
+
 def as_evaluation(plans: pd.DataFrame, weights, best: bool) -> pd.DataFrame:
     """The study's rows of one environment as an evaluation: dense conifer, or at each weight the best plan.
 
@@ -60,16 +86,23 @@ def as_evaluation(plans: pd.DataFrame, weights, best: bool) -> pd.DataFrame:
 
 
 def main(args: Args) -> None:
-    """Evaluate the plans in both environments, unless the table is there."""
+    """Evaluate the plans, but for what is there."""
     args = replace(args, eval_episodes=2) if args.quick else args
     folder = results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR
-    path = folder / "constant_plans.csv"
-    settings = {"episodes": args.eval_episodes, "actions": PLANTING, "physics": open_loop.fingerprint()}
-    if stored.is_finished(path, settings):
-        print(f"{path} is finished")
-        return
-    stored.write(path, pd.concat([study(env_id, args.eval_episodes) for env_id in ENVIRONMENTS]), settings)
-    print(f"wrote {path}")
+    sites = experiments.SITE_SEEDS[: 1 if args.quick else None]
+    physics = open_loop.fingerprint()
+    tables = {
+        "constant_plans": ({"episodes": args.eval_episodes, "actions": PLANTING, "physics": physics}, lambda: pd.concat(
+            [study(env_id, args.eval_episodes) for env_id in ENVIRONMENTS])),
+        "constant_plans_of_sites": ({"sites": sites, "physics": physics}, lambda: study_of_sites(sites)),
+    }  # fmt: skip
+    for name, (settings, make) in tables.items():
+        path = folder / f"{name}.csv"
+        if stored.is_finished(path, settings):
+            print(f"{path} is finished")
+        else:
+            stored.write(path, make(), settings)
+            print(f"wrote {path}")
 
 
 if __name__ == "__main__":

@@ -1,13 +1,18 @@
 """Growing season against thaw return, latent heat and shortwave on the ground: correlations, and pairs of stands.
 
 The correlations are over evaluation episodes and weights, as the paper's: sites differ in everything at once. The
-pairs (analysis/studies/mechanism_pairs.py) differ in the season alone.
+season is that of leaves, as the paper defines it for the observation (day of fall less day of growth), and beside it
+that of days above 5 degC. The pairs (analysis/studies/mechanism_pairs.py) differ in the season alone.
 """
+
+from functools import cache
 
 import pandas as pd
 
+import sim
 from analysis import metrics
 from analysis.experiments import METHODS
+from analysis.studies.mechanism_pairs import effects
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Growing-season correlations"
@@ -19,17 +24,26 @@ COLUMNS = ROW_COLUMNS | {
     "variable": "variable",
     "r": "r",
     "paper_r": "r (paper, all methods)",
+    "r_warm": "r, days above 5 °C",
     "r_gain": "r of the gain",
     "leaves_effect": "pairs: leaves 40 days longer",
     "climate_effect": "pairs: climate 1 K warmer",
 }
 
 
+@cache
+def season_of_leaves(site_seed: int) -> float:
+    """Days between the first leaves and their fall at a sampled site."""
+    site = sim.sample_site(site_seed)
+    return site["fall_start_day"] - site["growth_start_day"]
+
+
 def correlations(one) -> dict:
-    """r of the growing season with each variable, and with the gain in thaw over zero change."""
-    season = one.evaluation.growing_season_days
-    row = {name: season.corr(one.evaluation[name]) for name in VARIABLES}
-    gain = None if one.gains is None else season.corr(one.gains.thaw_return)
+    """r of the season of leaves, and of days above 5 degC ("warm_"), with each variable and the gain in thaw."""
+    leaves, warm = one.evaluation.site_seed.map(season_of_leaves), one.evaluation.growing_season_days
+    row = {name: leaves.corr(one.evaluation[name]) for name in VARIABLES}
+    row |= {f"warm_{name}": warm.corr(one.evaluation[name]) for name in VARIABLES}
+    gain = None if one.gains is None else leaves.corr(one.gains.thaw_return)
     return row | {"r_gain": gain}
 
 
@@ -37,8 +51,7 @@ def pair_effects(pairs: pd.DataFrame | None, variable: str) -> dict:
     """Mean effect of a longer season over the sites, upper less lower, with its 95 % interval."""
     row = {}
     for name, pair in SEASON_PAIRS.items() if pairs is not None else ():
-        sites = pairs[pairs.pair == pair]
-        mean, half_width = metrics.mean_interval(sites[f"upper_{variable}"] - sites[f"lower_{variable}"])
+        mean, half_width = metrics.mean_interval(effects(pairs, pair, variable))
         row |= {f"{name}_effect": mean, f"{name}_effect_low": mean - half_width,
                 f"{name}_effect_high": mean + half_width}  # fmt: skip
     return row
@@ -50,9 +63,10 @@ def make(results) -> pd.DataFrame:
     pairs = results.study("mechanism_pairs")
     rows = []
     for key, replicates in results.of_main_and_others(("zero_change", *METHODS)).items():
-        table = pd.DataFrame([correlations(one) for one in replicates], columns=[*VARIABLES, "r_gain"]).astype(float)
+        columns = [*VARIABLES, *(f"warm_{name}" for name in VARIABLES), "r_gain"]
+        table = pd.DataFrame([correlations(one) for one in replicates], columns=columns).astype(float)
         for variable, its_name in VARIABLES.items():
-            chosen = table[[variable]].set_axis(["r"], axis=1)
+            chosen = table[[variable, f"warm_{variable}"]].set_axis(["r", "r_warm"], axis=1)
             if variable == "thaw_return" and key[0] != "zero_change":
                 chosen = chosen.assign(r_gain=table.r_gain)
             row = row_of(key, len(table)) | {"variable": variable, "paper_r": published[its_name]}

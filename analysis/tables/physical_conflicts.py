@@ -1,15 +1,21 @@
-"""What one change of a stand does to both objectives, all else equal (analysis/studies/mechanism_pairs.py)."""
+"""What one change of a stand does to both objectives, all else equal (analysis/studies/mechanism_pairs.py).
+
+And with a mechanism switched off: the effect on thaw without interception and without moss, on carbon without fire.
+"""
 
 import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.studies.mechanism_pairs import PAIRS
+from analysis.studies.mechanism_pairs import ALL_ON, PAIRS, effects
 from analysis.tables.common import paper
 
 TITLE = "Physical conflicts"
 EFFECTS = ("carbon_return", "thaw_return", "net_carbon_change_kgc_m2", "boundary_warming_mj_m2",
-           "ground_shortwave_mj_m2", "latent_heat_mj_m2", "peak_swe_mm", "winter_albedo")  # fmt: skip
+           "ground_shortwave_mj_m2", "latent_heat_mj_m2", "active_layer_depth_m", "peak_swe_mm",
+           "winter_albedo")  # fmt: skip
+WITHOUT = {"thaw_without_interception": ("thaw_return", "interception"), "thaw_without_moss": ("thaw_return", "moss"),
+           "carbon_without_fire": ("carbon_return", "fire")}  # fmt: skip
 COLUMNS = {
     "change": "change",
     "sites": "sites",
@@ -17,12 +23,17 @@ COLUMNS = {
     "thaw_return": "thaw return",
     "conflict": "conflict",
     "share_of_sites_in_conflict": "sites in conflict %",
+    "clipped_sites": "sites whose thaw reward is clipped in a year",
+    "thaw_without_interception": "thaw return without interception",
+    "thaw_without_moss": "thaw return without moss and organic layer",
+    "carbon_without_fire": "carbon return without fire",
     "paper_carbon": "carbon (paper)",
     "paper_permafrost": "permafrost (paper)",
     "paper_conflict": "conflict (paper)",
     "boundary_warming_mj_m2": "warming (MJ/m2/yr)",
     "ground_shortwave_mj_m2": "shortwave on ground (MJ/m2/yr)",
     "latent_heat_mj_m2": "latent heat (MJ/m2/yr)",
+    "active_layer_depth_m": "active layer (m)",
     "peak_swe_mm": "peak snow (mm)",
     "winter_albedo": "winter albedo",
 }
@@ -42,13 +53,16 @@ def make(results) -> pd.DataFrame:
         row = {"change": pair, "conflict": "not played yet"}
         row |= next((published.loc[name].to_dict() for name in published.index if pair.startswith(name)), {})
         if pairs is not None:
-            sites = pairs[pairs.pair == pair]
-            apart = {name: (sites[f"upper_{name}"] - sites[f"lower_{name}"]).to_numpy() for name in EFFECTS}
+            apart = {name: effects(pairs, pair, name) for name in EFFECTS}
+            apart |= {name: effects(pairs, pair, variable, off) for name, (variable, off) in WITHOUT.items()}
+            sites = pairs[(pairs.pair == pair) & (pairs.off == ALL_ON)]
+            clipped = sites[["lower_thaw_clipped_years", "upper_thaw_clipped_years"]].max(axis=1) > 0
             means = {name: metrics.mean_interval(values) for name, values in apart.items()}
             for name, (mean, half_width) in means.items():
                 row |= {name: mean, f"{name}_low": mean - half_width, f"{name}_high": mean + half_width}
             opposed = np.sign(apart["carbon_return"]) * np.sign(apart["thaw_return"]) < 0
-            row |= {"sites": len(sites), "conflict": verdict(means["carbon_return"], means["thaw_return"]),
+            row |= {"sites": len(sites), "clipped_sites": clipped.sum(),
+                    "conflict": verdict(means["carbon_return"], means["thaw_return"]),
                     "share_of_sites_in_conflict": 100 * opposed.mean()}  # fmt: skip
         rows.append(row)
     return pd.DataFrame(rows)

@@ -19,6 +19,7 @@ def write_run(folder, script, seed=1, carbon=(0, 1, 2), thaw=(2, 1, 0), weights=
         for weight, c, t in zip(weights, carbon, thaw, strict=True):
             for episode, site in enumerate((-1.0, 1.0)):
                 rows.append({"policy": policy, "preference": weight, "episode": episode, "seed": episode,
+                             "site_seed": episode,
                              "carbon_return": c + site + shift, "thaw_return": t + 3 * site + shift,
                              "growing_season_days": 110 + 10 * site, "latent_heat_mj_m2": 500 - site,
                              "ground_shortwave_mj_m2": 1500 + site})
