@@ -65,7 +65,8 @@ why, as far as an experiment tells.
 **Numbers.** Ours are interquartile means over training seeds with 95 % bootstrap intervals, of sampled policies on the
 same evaluation sites and weathers; differences between methods are paired by seed. Returns are sums over 50 years;
 gains are returns less those of zero change on the same episodes. What is over sites or episodes is a mean with its 95 %
-t interval, and has no training in it.
+t interval, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
+pairs of stands are compared the active layer stands beside it.
 
 **Verdicts.** A claim that one thing is more than another is reproduced if the whole interval of the difference has its
 sign; it is not if the interval has the other sign, or includes zero and no effect worth the name: of a return a quarter

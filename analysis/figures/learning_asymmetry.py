@@ -1,11 +1,15 @@
 """Learning with one fixed weight: carbon against thaw, on all sites and on single ones, and what is done meanwhile."""
 
 import matplotlib
+import numpy as np
 
 from analysis.figures.common import (
+    BINS,
     SEEDS_95,
     STEPS,
     WEIGHT_COLOURS,
+    band,
+    binned,
     finish,
     learning_curve,
     letter,
@@ -14,9 +18,10 @@ from analysis.figures.common import (
 )
 from analysis.figures.learning_curves import gain_curve
 
-SIZE = (7.2, 4.8)
+SIZE = (7.2, 5.0)
 CAPTION = ("Fixed λ EUPG, one agent a weight; sums over 50 years; gains: less zero change on the same episodes; "
-           f"{SEEDS_95}; (b) over sites.")  # fmt: skip
+           f"{SEEDS_95}; (b, f) over sites. (f) agents of one objective alone, its gain in training; dashed: with "
+           "--baseline others.")  # fmt: skip
 GAIN = "scalarized_gain"
 PANELS = {  # experiment, column of the training episodes, label, title
     "a": ("fixed", "scalarized_return", "scalarised return", "all sites"),
@@ -25,13 +30,13 @@ PANELS = {  # experiment, column of the training episodes, label, title
     "d": ("fixed", "final_density", "stems/ha after 50 years", "stem density, all sites"),
     "e": ("fixed", "final_conifer_fraction", "conifer fraction after 50 years", "species, all sites"),
 }
+BASELINES = {"-": {}, "--": {"baseline": "others"}}
 
 
 def draw(figure, results) -> None:
-    """Five panels, a curve for each weight; the sixth place is the legend's."""
-    *axes, place = figure.subplots(2, 3).flat
-    letter(axes, [title for *_, title in PANELS.values()])
-    place.axis("off")
+    """Six panels; in the first five a curve for each weight."""
+    *axes, alone = figure.subplots(2, 3).flat
+    letter([*axes, alone], [*(title for *_, title in PANELS.values()), "own gain, single sites"])
     colours, nothing = matplotlib.colormaps[WEIGHT_COLOURS], results.study("training_gains")
     for ax, (experiment, column, label, _) in zip(axes, PANELS.values(), strict=True):
         if not wanting(ax, results, experiment, "eupg_fixed_lambda") and column == GAIN and nothing is None:
@@ -45,6 +50,28 @@ def draw(figure, results) -> None:
             else:
                 learning_curve(ax, of_weight, column, colours(0.9 * weight), f"weight of carbon {weight:g}")
         finish(ax, legend=False, ylabel=label, **STEPS)
+    own_gains(alone, results, colours)
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
-        place.legend(handles, labels, loc="center")
+        figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=6)
+
+
+def own_gains(ax, results, colours) -> None:
+    """Gain over zero change, in the objective that it is trained for, of agents of one alone; all episodes are one."""
+    zero = {one.runs[0].arguments["site_seed"]: one.evaluation for one in results.of("site", "zero_change")}
+    for script in ("eupg_fixed_lambda", "zero_change"):
+        wanting(ax, results, "site", script)
+    for style, flags in BASELINES.items():
+        runs = [run for one in results.of("site", "eupg_fixed_lambda", **flags) for run in one.runs
+                if run.arguments["site_seed"] in zero]  # fmt: skip
+        for weight, objective in ((0.0, "thaw_return"), (1.0, "carbon_return")):
+            of_weight = [run for run in runs if run.arguments["preference"] == weight]
+            if not of_weight:
+                continue
+            steps = max(run.arguments["total_timesteps"] for run in of_weight)
+            curves = np.array([binned(run.episodes, objective, steps)
+                               - zero[run.arguments["site_seed"]][objective].mean() for run in of_weight])
+            known = ~np.isnan(curves).any(axis=0)
+            x = (np.arange(BINS) + 0.5) * steps / BINS / 1000
+            band(ax, x[known], curves[:, known], colours(0.9 * weight), None, style)
+    finish(ax, legend=False, ylabel="gain in the own objective", **STEPS)
