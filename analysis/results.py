@@ -114,10 +114,10 @@ class Results:
         return metrics.gains(evaluation, longest) if known else None
 
     def of(self, experiment: str, script: str, **flags) -> list[Replicate]:
-        """Replicates of an experiment's row: the first of its jobs with these flags says which."""
-        job = next(job for job in self.jobs if job.experiment == experiment and job.script == script
-                   and all(job.flags.get(name) == value for name, value in flags.items()))  # fmt: skip
-        return self.rows[job.row]
+        """Replicates of an experiment's row: the first of its jobs with these flags says which; none without a job."""
+        job = next((job for job in self.jobs if job.experiment == experiment and job.script == script
+                    and all(job.flags.get(name) == value for name, value in flags.items())), None)  # fmt: skip
+        return [] if job is None else self.rows[job.row]
 
     def expected(self, key: tuple) -> int:
         """Replicates that the experiments have of a row."""

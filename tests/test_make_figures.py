@@ -78,3 +78,9 @@ def test_an_empty_panel_shows_its_command():
     ax = Figure().subplots()
     no_data(ax, "python a.py --seed 1")
     assert words(ax) == "no run yet: python a.py --seed 1"
+
+
+def test_figures_of_the_quick_jobs_are_drawn():
+    results = Results((TINY_RUNS,), experiments.quick_jobs(), TINY_RUNS / "no studies")
+    for module in make_figures.FIGURES:
+        assert make_figures.draw(module, results).get_axes()
