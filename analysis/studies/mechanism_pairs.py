@@ -93,7 +93,7 @@ class Args:
     sites: int = 48
     """sampled sites, each with one weather"""
     quick: bool = False
-    """2 sites and 5 years, into results/quick/studies"""
+    """2 sites and 1 year, into results/quick/studies"""
 
 
 def play(change: dict, stand: dict, action: int, off: str, sites: int, years: int) -> pd.DataFrame:
@@ -134,7 +134,7 @@ def effects(pairs: pd.DataFrame, pair: str, variable: str, off: str = ALL_ON) ->
 
 def main(args: Args) -> None:
     """Play all pairs, unless the table is there."""
-    sites, years = (2, 5) if args.quick else (args.sites, YEARS)
+    sites, years = (2, 1) if args.quick else (args.sites, YEARS)
     folder = results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR
     path = folder / "mechanism_pairs.csv"
     settings = {"sites": sites, "years": years, "pairs": list(PAIRS), "off": OFF, "means": MEANS,
