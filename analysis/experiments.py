@@ -244,7 +244,7 @@ def jobs(only=tuple(EXPERIMENTS), seeds: list[int] | None = None) -> list[Job]:
 # ------------------------------------------------------------------------------------------------- in small
 
 QUICK_DIR, QUICK_ARCHIVE_DIR = Path("runs/quick"), Path("results/quick/runs")
-QUICK_STEPS = 3200
+QUICK_STEPS = 1600  # an episode of each of 32 stands
 QUICK_EVALUATION = {"eval_episodes": 2, "eval_weights": (0.0, 0.5, 1.0)}
 
 

@@ -14,7 +14,9 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal
 
@@ -176,8 +178,8 @@ def main(args: Args) -> None:
         return not job.is_study and any(job.made(config) for config in configs)
 
     print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-    for number in (1, 8, 32):
-        boreal_env.warm_up(number)
+    with ProcessPoolExecutor(available_cores(), mp_context=get_context("spawn")) as pool:
+        list(pool.map(boreal_env.warm_up, (32, 8, 1)))
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(available_cores()))
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

@@ -113,14 +113,19 @@ def binned(episodes: pd.DataFrame, column: str, steps: int, statistic: str = "me
     return episodes[column].groupby(number).agg(statistic).reindex(range(bins)).to_numpy()
 
 
-def learning_curve(ax, replicates, column: str, colour, label: str, statistic="mean", marker=None) -> None:
-    """A column of the training episodes against environment steps; one run a replicate."""
+def training_curve(ax, tables, column: str, steps: int, colour, label, statistic="mean", bins=BINS, **kwargs) -> None:
+    """A column of training episodes against environment steps; one table a replicate."""
+    curves = np.array([binned(table, column, steps, statistic, bins) for table in tables])
+    known = ~np.isnan(curves).any(axis=0)
+    x = (np.arange(bins) + 0.5) * steps / bins / 1000
+    band(ax, x[known], curves[:, known], colour, label, **kwargs)
+
+
+def learning_curve(ax, replicates, column: str, colour, label: str, **kwargs) -> None:
+    """A column of the training episodes of replicates of one run each."""
     runs = [one.runs[0] for one in replicates]
     steps = max(run.arguments["total_timesteps"] for run in runs)
-    curves = np.array([binned(run.episodes, column, steps, statistic) for run in runs])
-    known = ~np.isnan(curves).any(axis=0)
-    x = (np.arange(BINS) + 0.5) * steps / BINS / 1000
-    band(ax, x[known], curves[:, known], colour, label, marker=marker)
+    training_curve(ax, [run.episodes for run in runs], column, steps, colour, label, **kwargs)
 
 
 def by_year(replicates, variable: str) -> np.ndarray:

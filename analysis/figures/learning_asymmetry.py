@@ -1,19 +1,16 @@
 """Learning with one fixed weight: carbon against thaw, on all sites and on single ones, and what is done meanwhile."""
 
 import matplotlib
-import numpy as np
 
 from analysis.figures.common import (
-    BINS,
     SEEDS_95,
     STEPS,
     WEIGHT_COLOURS,
-    band,
-    binned,
     finish,
     learning_curve,
     letter,
     no_data,
+    training_curve,
     wanting,
 )
 from analysis.figures.learning_curves import gain_curve
@@ -50,13 +47,13 @@ def draw(figure, results) -> None:
             else:
                 learning_curve(ax, of_weight, column, colours(0.9 * weight), f"weight of carbon {weight:g}")
         finish(ax, legend=False, ylabel=label, **STEPS)
-    own_gains(alone, results, colours)
+    site_gains(alone, results, colours)
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=6)
 
 
-def own_gains(ax, results, colours) -> None:
+def site_gains(ax, results, colours) -> None:
     """Gain over zero change, in the objective that it is trained for, of agents of one alone; all episodes are one."""
     zero = {one.runs[0].arguments["site_seed"]: one.evaluation for one in results.of("site", "zero_change")}
     for script in ("eupg_fixed_lambda", "zero_change"):
@@ -69,9 +66,7 @@ def own_gains(ax, results, colours) -> None:
             if not of_weight:
                 continue
             steps = max(run.arguments["total_timesteps"] for run in of_weight)
-            curves = np.array([binned(run.episodes, objective, steps)
-                               - zero[run.arguments["site_seed"]][objective].mean() for run in of_weight])
-            known = ~np.isnan(curves).any(axis=0)
-            x = (np.arange(BINS) + 0.5) * steps / BINS / 1000
-            band(ax, x[known], curves[:, known], colours(0.9 * weight), None, style)
+            tables = [run.episodes.assign(gain=run.episodes[objective]
+                                          - zero[run.arguments["site_seed"]][objective].mean()) for run in of_weight]
+            training_curve(ax, tables, "gain", steps, colours(0.9 * weight), None, style=style)
     finish(ax, legend=False, ylabel="gain in the own objective", **STEPS)

@@ -1,20 +1,17 @@
 """Whether the methods learn: returns and gains in training, against fixed strategies and the best constant plan."""
 
-import numpy as np
-
 from analysis import metrics
 from analysis.experiments import HEURISTICS, METHODS
 from analysis.figures.common import (
     COLOURS,
     SEEDS_95,
     STEPS,
-    band,
-    binned,
     finish,
     learning_curve,
     methods,
     no_data,
     panels,
+    training_curve,
 )
 from analysis.results import TITLES
 from analysis.studies import constant_plans
@@ -58,10 +55,7 @@ def gain_curve(ax, replicates, nothing, column: str, colour) -> None:
     if any(table is None for _, table in found):
         return
     steps = max(run.arguments["total_timesteps"] for run, _ in found)
-    curves = np.array([binned(table, column, steps, bins=PARTS) for _, table in found])
-    known = ~np.isnan(curves).any(axis=0)
-    x = (np.arange(PARTS) + 0.5) * steps / PARTS / 1000
-    band(ax, x[known], curves[:, known], colour, None)
+    training_curve(ax, [table for _, table in found], column, steps, colour, None, bins=PARTS)
 
 
 def baselines(results, nothing) -> list[tuple]:

@@ -20,5 +20,5 @@ def draw(figure, results) -> None:
                    markerfacecolor="none")  # fmt: skip
     finish(sites, xlabel="temperature at 12 m less mean annual air (K)", ylabel="thaw return (50 years)")
     for script, title in methods(volatility, results):
-        learning_curve(volatility, results.of("main", script), "thaw_return", COLOURS[script], title, "std")
+        learning_curve(volatility, results.of("main", script), "thaw_return", COLOURS[script], title, statistic="std")
     finish(volatility, ylabel="standard deviation of thaw returns", **STEPS)

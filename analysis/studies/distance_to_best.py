@@ -50,7 +50,7 @@ class Args:
     overwrite: bool = False
     """evaluate the runs found again, though the table has them; start over if the physics is another"""
     quick: bool = False
-    """2 sites, 2 weathers and 3 weights, into results/quick/studies"""
+    """one site, 2 weathers, 3 weights, one agent of a kind; into results/quick/studies"""
 
 
 # ------------------------------------------------------------------------------------- the best known plans
@@ -302,7 +302,7 @@ def complete(table: pd.DataFrame, plans: dict[int, pd.DataFrame]) -> pd.DataFram
 def main(args: Args) -> None:
     """Evaluate what the table lacks, and write it after each agent."""
     physics = open_loop.fingerprint()
-    plans = read_plans(FRONTS_DIR, physics, *((experiments.FRONT_SITES[:2], 2) if args.quick else ()))
+    plans = read_plans(FRONTS_DIR, physics, *((experiments.FRONT_SITES[:1], 2) if args.quick else ()))
     weights = experiments.QUICK_EVALUATION["eval_weights"] if args.quick else WEIGHTS
     weathers = sorted(set(next(iter(plans.values())).weather))
     settings = {"sites": list(plans), "weathers": weathers, "weights": weights, "physics": physics}
@@ -321,6 +321,9 @@ def main(args: Args) -> None:
     for folder, config in agents(args.runs_dir or (experiments.QUICK_DIR if args.quick else runs.RUNS_DIR), plans):
         own = (config["arguments"]["preference"],) if "preference" in config["arguments"] else weights
         todo.append((name_of(config), (folder, config), own))
+    if args.quick:
+        kinds = {tuple(one[0][column] for column in ("method", "trained_on", "trained_for")): one for one in todo[::-1]}
+        todo = list(kinds.values())[::-1]
     todo = [one for one in todo if args.overwrite or not has(table, one[0])]
     print(f"{len(todo)} agents and strategies to evaluate, for {path}", flush=True)
 
