@@ -203,6 +203,7 @@ def variants(seeds) -> list[Job]:
         ("eupg_var_lambda", {"num_envs": 32}),
         ("eupg_var_lambda", {"utility": "future"}),
         ("eupg_var_lambda", {"baseline": "others"}),
+        ("eupg_var_lambda", {"ent_coef": 0.05}),
         ("eupg_var_lambda", {"num_envs": 1}),
     )
     judged = ({"ent_coef": 0.0, "per_objective_advantages": True}, {"hide_site": True})  # by analysis/paper_claims

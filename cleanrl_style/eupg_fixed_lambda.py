@@ -20,7 +20,14 @@ from analysis import protocol
 
 @dataclass
 class Args:
-    """EUPG with one preference: trains, evaluates at this preference, and leaves a run folder."""
+    """EUPG with one preference: trains, evaluates at this preference, and leaves a run folder.
+
+    python cleanrl_style/eupg_fixed_lambda.py --preference 0.3 --vectorization lockstep --total-timesteps 3200
+
+    is a trial. Without the last flag it trains for 300,000 steps. A stopped run goes on with the same command, to the
+    same bytes. The folder gets config.json, episodes.csv, updates.csv, evaluation.csv and summary.png, which
+    docs/algorithms explains; python analysis/make_tables.py sets it beside other runs.
+    """
 
     seed: int = 1
     """seed of the run: agent, sampling and training episodes"""
@@ -52,6 +59,8 @@ class Args:
     """what weights an action's gradient: utility of the episode's whole return, accrued and future; or of the future"""
     baseline: Literal["none", "others"] = "none"
     """what is subtracted from a return: nothing, by the definition, or the mean of the batch's other episodes"""
+    ent_coef: float = 0.0
+    """coefficient of the entropy bonus, in units of return; 0 by the definition"""
 
     # Evaluation and output
     eval_episodes: int = 100
@@ -122,7 +131,7 @@ def compute_utilities(rewards, preferences, gamma, which, baseline="none"):
 
 
 def eupg_loss(agent, x, mask, action, utility):
-    """Loss whose gradient is EUPG's, without a baseline, and the policy's mean entropy."""
+    """Loss whose gradient is EUPG's, for what weights each action, and the policy's mean entropy."""
     _, logprob, entropy, _ = agent.get_action_and_value(x, mask, action)
     return -(logprob * utility).mean(), entropy.mean()
 
@@ -135,6 +144,9 @@ if __name__ == "__main__":
                       "utility_std")
     if args.baseline == "others" and args.num_envs == 1:
         protocol.fail("--baseline others is the mean of a batch's other episodes: --num-envs 1 has none")
+    if args.env_id in protocol.MODES and args.total_timesteps < boreal_env.DEFAULT_YEARS * args.num_envs:
+        protocol.fail(f"--total-timesteps {args.total_timesteps} has no room for a batch, an episode of each "
+                      f"environment: {boreal_env.DEFAULT_YEARS * args.num_envs} steps")
 
     with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
         # TRY NOT TO MODIFY: seeding
@@ -218,7 +230,7 @@ if __name__ == "__main__":
             loss, entropy = eupg_loss(agent, torch.cat(obs), torch.cat(masks), torch.cat(actions),
                                       torch.from_numpy(utilities.ravel().astype(np.float32)))
             optimizer.zero_grad()
-            loss.backward()
+            (loss - args.ent_coef * entropy).backward()
             gradient_norm = nn.utils.clip_grad_norm_(agent.parameters(), math.inf)  # measures, clips nothing
             optimizer.step()
 

@@ -19,7 +19,14 @@ from analysis import protocol
 
 @dataclass
 class Args:
-    """Gated PPO with a curriculum: trains on chosen episodes, evaluates, and leaves a run folder."""
+    """Gated PPO with a curriculum: trains on chosen episodes, evaluates, and leaves a run folder.
+
+    python cleanrl_style/ppo_curriculum.py --vectorization lockstep --total-timesteps 3200
+
+    is a trial. Without the last flag it trains for 300,000 steps. A stopped run goes on with the same command, to the
+    same bytes. The folder gets config.json, episodes.csv, updates.csv, evaluation.csv and summary.png, which
+    docs/algorithms explains; python analysis/make_tables.py sets it beside other runs.
+    """
 
     seed: int = 1
     """seed of the run: agent, sampling and training episodes"""
@@ -199,13 +206,15 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value
 class Curriculum:
     """Chooses the episodes to train on: those that a fixed random network of the site, or a coin, scores above tau.
 
-    In environments without the 62 site observations (site-specific mode) the network accepts all episodes.
+    Where there is nothing to choose by, the network accepts all episodes: in environments without the 62 site
+    observations (site-specific mode), and with one site in all episodes.
     """
     NUM_SITE_INPUTS = 62
 
-    def __init__(self, observation_dim, seed, threshold, raw, selector):
+    def __init__(self, observation_dim, seed, threshold, raw, selector, one_site=False):
         self.coin = np.random.default_rng([seed, 1]) if selector == "coin" else None
-        self.accepts_all = self.coin is None and observation_dim != len(boreal_env.OBSERVATION_NAMES)
+        sees_sites = observation_dim == len(boreal_env.OBSERVATION_NAMES) and not one_site
+        self.accepts_all = self.coin is None and not sees_sites
         self.threshold = 0.0 if self.accepts_all else threshold
         # a generator of its own: the agent is the one that ppo_gated starts from
         generator = np.random.default_rng(seed)
@@ -217,7 +226,7 @@ class Curriculum:
             self.mean, self.std = logits.mean(), logits.std()
         # sum and number of the returns seen so far in each tenth of the preference
         self.decile_sum, self.decile_count = np.zeros(10), np.zeros(10)
-        self.finished = []
+        self.finished, self.num_transitions = [], 0
 
     def logit(self, sites):
         for layer in self.layers[:-1]:
@@ -290,7 +299,8 @@ if __name__ == "__main__":
         next_done = np.zeros(args.num_envs, dtype=bool)
         episode_returns = np.zeros((args.num_envs, 2))
         # CURRICULUM: of the episode under way in each environment
-        curriculum = Curriculum(next_obs.shape[1], args.seed, args.threshold, args.raw_selector, args.selector)
+        curriculum = Curriculum(next_obs.shape[1], args.seed, args.threshold, args.raw_selector, args.selector,
+                                one_site=args.site_seed is not None)
         scores, thresholds = curriculum.score(next_obs), np.full(args.num_envs, curriculum.threshold)
         selected = scores > thresholds
 
@@ -419,8 +429,10 @@ if __name__ == "__main__":
             row = {"iteration": iteration, "global_step": global_step}
             if losses:
                 row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0), strict=True))
+            if len(y_true) > 1:
                 row["explained_variance"] = (1 - (y_true - y_pred).var(dim=0).sum() / y_true.var(dim=0).sum()).item()
             # CURRICULUM: the threshold of the next rollout's episodes
+            curriculum.num_transitions += len(b_inds)
             num_selected, num_skipped = curriculum.update_threshold()
             row |= {"threshold": curriculum.threshold, "selected_episodes": num_selected,
                     "skipped_episodes": num_skipped, "selected_transitions": len(b_inds)}
@@ -438,6 +450,10 @@ if __name__ == "__main__":
             run.save(global_step, last=iteration == num_iterations, **state)
 
         envs.close()
+        # CURRICULUM
+        if not curriculum.num_transitions:
+            print(f"warning: no episode scored above the threshold of {curriculum.threshold:g}: the agent that is "
+                  "evaluated is untrained", flush=True)
 
         def action_probabilities(observations, masks, accrued_returns):
             with torch.no_grad():

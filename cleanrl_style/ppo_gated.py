@@ -19,7 +19,14 @@ from analysis import protocol
 
 @dataclass
 class Args:
-    """Gated PPO on the boreal forest environments: trains, evaluates, and leaves a run folder."""
+    """Gated PPO on the boreal forest environments: trains, evaluates, and leaves a run folder.
+
+    python cleanrl_style/ppo_gated.py --vectorization lockstep --total-timesteps 3200
+
+    is a trial. Without the last flag it trains for 300,000 steps. A stopped run goes on with the same command, to the
+    same bytes. The folder gets config.json, episodes.csv, updates.csv, evaluation.csv and summary.png, which
+    docs/algorithms explains; python analysis/make_tables.py sets it beside other runs.
+    """
 
     seed: int = 1
     """seed of the run: agent, sampling and training episodes"""
@@ -330,6 +337,7 @@ if __name__ == "__main__":
             row = {"iteration": iteration, "global_step": global_step}
             if losses:
                 row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0), strict=True))
+            if len(y_true) > 1:
                 row["explained_variance"] = (1 - (y_true - y_pred).var(dim=0).sum() / y_true.var(dim=0).sum()).item()
 
             run.log("updates", row)

@@ -153,6 +153,19 @@ def test_without_site_observations_every_episode_is_accepted():
     assert (make_curriculum(size=43).score(np.zeros((4, 43), np.float32)) > 0.5).all()
 
 
+def test_one_site_in_all_episodes_is_accepted(tmp_path):
+    """This site scores below the threshold: the agent would never be trained."""
+    assert make_curriculum().score(boreal_env.sample_site_observations([2]))[0] < 0.5
+    run_script(SCRIPT, "--site-seed", 2, "--vectorization", "lockstep", "--num-envs", 2, "--rollout-steps", 100,
+               "--total-timesteps", 100, "--eval-episodes", 1, "--eval-weights", 0.5, "--run-dir", tmp_path)
+    assert pd.read_csv(tmp_path / "updates.csv").selected_transitions.tolist() == [100]
+
+
+def test_an_agent_without_a_selected_episode_is_said_to_be_untrained(tmp_path, capsys):
+    train(tmp_path, "--threshold", 1)
+    assert "warning: no episode scored above the threshold of 1: the agent that" in capsys.readouterr().out
+
+
 def test_a_coin_accepts_half_whatever_the_site():
     curriculum = make_curriculum(selector="coin")
     scores = curriculum.score(np.zeros((10_000, 3), np.float32))

@@ -16,7 +16,7 @@ def body(script):
     source = (ROOT / "cleanrl_style" / f"{script}.py").read_text()
     source = source[source.index("import math"):]
     start = source.index('    """')
-    return source[:start] + source[source.index("\n", start):]
+    return source[:start] + source[source.index('"""', start + 7):]
 
 
 def test_ppo_curriculum_is_ppo_gated_and_its_marked_blocks():
@@ -106,6 +106,12 @@ def test_tracking_without_the_package_is_refused(tmp_path, monkeypatch):
     with pytest.raises(SystemExit, match="--track wandb: the package is not installed"):
         run_script("cleanrl_style/ppo_gated.py", "--track", "wandb", "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def test_a_single_transition_has_no_explained_variance(tmp_path, recwarn):
+    run_script("cleanrl_style/ppo_gated.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path, "--total-timesteps",
+               1, "--num-envs", 1, "--eval-episodes", 1, "--eval-weights", 0.5)
+    assert pd.read_csv(tmp_path / "updates.csv").explained_variance.isna().all() and not recwarn.list
 
 
 def test_one_site_under_all_weathers(tmp_path):

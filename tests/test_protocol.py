@@ -8,7 +8,7 @@ from scripts import run_script
 from toy_env import LENGTH, optimal_return
 
 from analysis import protocol
-from analysis.protocol import evaluation
+from analysis.protocol import evaluation, run_folder
 from analysis.protocol.progress import Progress
 
 
@@ -254,6 +254,12 @@ def test_folder_names_say_what_is_not_default(tmp_path, monkeypatch):
         args = Arguments(**changes)
         protocol.prepare(args)
         assert str(protocol.Run(args, "script").folder) == f"runs/script/{name}/seed1"
+
+
+def test_a_name_too_long_for_a_folder_ends_in_its_hash():
+    first, second = (run_folder.folder_name("toy-v0", {"eval_weights": tuple(np.arange(n) / 100)}) for n in (100, 101))
+    assert first != second and first.startswith("toy-v0-eval_weights=0,0.01,")
+    assert {len(first), len(second)} == {run_folder.LONGEST_NAME}
 
 
 def test_progress_is_shown_at_once_and_at_the_end(capsys):

@@ -79,7 +79,45 @@ class HopelessToyEnv(ToyEnv):
         return np.zeros(25, dtype=bool)
 
 
+class ToyVectorEnv(gym.vector.VectorEnv):
+    """All environments in one call, for `--vectorization lockstep`; their episodes end, and restart, together."""
+
+    metadata = {"autoreset_mode": gym.vector.AutoresetMode.SAME_STEP}
+
+    def __init__(self, num_envs: int = 1):
+        self.num_envs = num_envs
+        self.single_observation_space = gym.spaces.Box(0, 1, (3,), np.float32)
+        self.single_action_space = gym.spaces.Discrete(25)
+        self.generator = np.random.default_rng()
+
+    def reset(self, *, seed=None, options=None):
+        if seed is not None:
+            self.generator = np.random.default_rng(seed)
+        drawn = self.generator.random(self.num_envs)
+        self.preference = np.asarray((options or {}).get("preference", drawn))
+        self.steps = 0
+        return self._observe(), {}
+
+    def _observe(self):
+        self.full = self.generator.random(self.num_envs) < 0.5
+        share = np.full(self.num_envs, self.steps / LENGTH)
+        return np.stack([self.preference, share, self.full], axis=1).astype(np.float32)
+
+    def call(self, name):
+        return np.where(np.arange(25) < 15, True, ~self.full[:, None])
+
+    def step(self, actions):
+        plants = actions >= 15
+        cost, mix = np.where(self.full, 1.0 * plants, 0.5 * ~plants), MIXES[actions % 5]
+        self.steps += 1
+        ended = np.full(self.num_envs, self.steps == LENGTH)
+        observations = self.reset()[0] if ended.all() else self._observe()
+        rewards = np.stack([mix - cost, 1 - mix**2 - cost], axis=1)
+        return observations, rewards, ended, np.zeros(self.num_envs, dtype=bool), {}
+
+
 gym.register("toy-v0", entry_point="toy_env:ToyEnv")
+gym.register("toy-lockstep-v0", entry_point="toy_env:ToyEnv", vector_entry_point="toy_env:ToyVectorEnv")
 gym.register("toy-sites-v0", entry_point="toy_env:ToyEnv", kwargs={"with_site": True})
 gym.register("toy-centred-v0", entry_point="toy_env:ToyEnv", kwargs={"offset": 0.6})
 gym.register("loose-toy-v0", entry_point="toy_env:LooseToyEnv")

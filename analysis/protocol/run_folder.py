@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import hashlib
 import importlib.metadata
 import io
 import json
@@ -39,6 +40,7 @@ RESULTS = ("evaluation.csv", "checkpoint.pt", "episodes.csv", "updates.csv", "ev
 # Steps between checkpoints, at least: counted in steps, since by the clock the last one would differ each time.
 CHECKPOINT_STEPS = 2048
 FLOAT_FORMAT = "%.9g"
+LONGEST_NAME = 200  # bytes of a folder's name; file systems allow 255
 
 
 @contextlib.contextmanager
@@ -92,8 +94,7 @@ class Run:
     def __init__(self, args, script: str, **tables):
         self.args, self.script = args, script
         changed = not_default(args)
-        name = "-".join([args.env_id.split(":")[-1].replace("/", "-"), *map(describe, changed.items())])
-        self.folder = Path(args.run_dir or Path("runs", script, name, f"seed{args.seed}"))
+        self.folder = Path(args.run_dir or Path("runs", script, folder_name(args.env_id, changed), f"seed{args.seed}"))
         self.config = {
             "script": script,
             "arguments": {k: value for k, value in vars(args).items() if k not in FREE_ARGUMENTS},
@@ -329,10 +330,15 @@ def differences(there: dict, here: dict) -> str:
                      for name in {**there, **here} if there.get(name) != here.get(name))
 
 
-def describe(item) -> str:
-    """name=value of an argument, for the name of a folder."""
-    name, value = item
-    return f"{name}={','.join(f'{v:g}' for v in value) if isinstance(value, tuple) else value}"
+def folder_name(env_id: str, changed: dict) -> str:
+    """Environment and name=value of what is not default; the end of a name too long for file systems is its hash."""
+    values = {name: ",".join(f"{v:g}" for v in value) if isinstance(value, tuple) else value
+              for name, value in changed.items()}
+    name = "-".join([env_id.split(":")[-1].replace("/", "-"), *(f"{k}={v}" for k, v in values.items())])
+    if len(name.encode()) <= LONGEST_NAME:
+        return name
+    digest = hashlib.sha256(name.encode()).hexdigest()[:12]
+    return f"{name.encode()[:LONGEST_NAME - 13].decode(errors='ignore')}-{digest}"
 
 
 def versions() -> dict:
