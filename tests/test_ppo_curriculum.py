@@ -329,8 +329,9 @@ def test_a_finished_run_is_left_alone(finished_run, capsys):
 
 
 def test_learns_the_toy(tmp_path):
-    train(tmp_path, "--total-timesteps", 24_000, "--num-envs", 8, "--rollout-steps", 1024, "--learning-rate",
-          0.002, "--eval-episodes", 10, "--eval-weights", 0, 0.5, 1, env_id="toy_env:toy-v0")
+    train(tmp_path, "--vectorization", "lockstep", "--total-timesteps", 48_000, "--num-envs", 32, "--rollout-steps",
+          1280, "--minibatch-size", 128, "--learning-rate", 0.003, "--eval-episodes", 10, "--eval-weights", 0, 0.5, 1,
+          env_id="toy_env:toy-lockstep-v0")
     evaluation = pd.read_csv(tmp_path / "evaluation.csv")
     returns = evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean()
     for weight in (0.0, 0.5, 1.0):

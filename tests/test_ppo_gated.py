@@ -93,9 +93,9 @@ def test_losses_and_their_gradient_are_those_of_an_independent_implementation(no
 
 
 def test_learns_the_toy(tmp_path):
-    run_script("cleanrl_style/ppo_gated.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path, "--total-timesteps",
-               24_000, "--num-envs", 8, "--rollout-steps", 1024, "--learning-rate", 0.002, "--eval-episodes", 10,
-               "--eval-weights", 0, 0.5, 1)
+    run_script("cleanrl_style/ppo_gated.py", "--env-id", "toy_env:toy-lockstep-v0", "--run-dir", tmp_path,
+               "--vectorization", "lockstep", "--total-timesteps", 48_000, "--num-envs", 32, "--rollout-steps", 1280,
+               "--minibatch-size", 128, "--learning-rate", 0.003, "--eval-episodes", 10, "--eval-weights", 0, 0.5, 1)
     evaluation = pd.read_csv(tmp_path / "evaluation.csv")
     returns = evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean()
     assert all(returns[weight] > 0.95 * optimal_return(weight) for weight in (0.0, 0.5, 1.0))
