@@ -11,8 +11,8 @@ from analysis.tables.learning_difficulty import YEAR, variance_components
 SIZE = (7, 5.8)
 CAPTION = (
     f"(b)-(d) one action in year {YEAR} under uniformly random valid actions, the same sites and weathers with either "
-    "action; intervals: 95 %, bootstrap over sites. (d) half of the episodes have either action; dashed line: those of "
-    "a training run."
+    "action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside. (d) half of the episodes "
+    "have either action; dashed line: those of a training run."
 )
 COMPONENTS = {"site": "#0072B2", "weather": "#56B4E9", "site x weather": "#999999", "policy": "#D55E00",
               "site x policy": "#E69F00"}  # fmt: skip

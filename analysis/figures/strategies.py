@@ -4,7 +4,8 @@ from analysis.figures.common import COLOURS, MARKERS, SEEDS_95, finish, methods,
 
 SIZE = (7, 5.2)
 CAPTION = (f"Evaluation, means over 100 episodes and the weights 0, 0.5 and 1; {SEEDS_95}. (c) last year: median, and "
-           "80 % of the episodes, a cross a weight and seed. (d) all weights.")  # fmt: skip
+           "80 % of the episodes, a cross a weight and seed. (d) all weights; eighths of the episodes by days above "
+           "5 °C.")  # fmt: skip
 
 
 def draw(figure, results) -> None:

@@ -134,13 +134,15 @@ def constant_gains(evidence, weight: float) -> pd.Series:
     return best_gains(evidence.study("constant_plans_of_sites"), OBJECTIVE[weight])
 
 
-@claim("It is the physics that keeps thaw from being learnt: its feedback is delayed and noisy.", "Section 4.2 and 5 "
-       "(our control, on single sites)", SITES,
+@claim("Delay by itself keeps thaw from being learnt, where sites and weathers make no noise.", "Section 4.2 and 5 "
+       "(our control, on single sites)", only("main", "site"),
        why="Episodes of site-specific mode differ in the agent's actions alone, so there is no noise but theirs; the "
            "delay is there. EUPG weighs every action by the whole return, and thaw's is large beside what a policy "
            "moves. With the mean of the batch's other episodes taken off, which leaves the expected gradient as it is, "
            "agents of thaw alone gain what constant plans can, by the same physics. Over all sites a common mean is no "
-           "such help, for it is the sites that differ (`docs/learning.md`).")
+           "such help, for it is the sites that differ (`docs/learning.md`).",
+       note="The paper names delay and noise together; the noise of sites is judged below. morl-baselines' EUPG, which "
+            "the paper names, weighs an action by the rewards to come, which was not run here on single sites.")
 def physics_hides_thaw(evidence):
     gains = {(name, baseline): mean_of(own_gains(evidence, weight, **flags), "sites")
              for name, weight in (("thaw", THAW), ("carbon", CARBON))

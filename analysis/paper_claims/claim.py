@@ -28,7 +28,8 @@ class Missing(Exception):
 class Number:
     """A number with its 95 % interval (NaN without one).
 
-    over : what the interval is over, "" for an exact number; count : how many of them, 0 if that says nothing.
+    over : what the interval is over, "" for an exact number; count : how many of them, 0 if that says nothing;
+    t_low, t_high : the t interval of the mean, where the other is a bootstrap over few (NaN without one).
     """
 
     value: float
@@ -36,6 +37,8 @@ class Number:
     high: float = np.nan
     over: str = ""
     count: int = 0
+    t_low: float = np.nan
+    t_high: float = np.nan
 
     @property
     def decides(self) -> bool:
@@ -46,8 +49,15 @@ class Number:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Its interval; an exact number is its own."""
-        return (self.low, self.high) if self.over else (self.value, self.value)
+        """What a verdict is judged by: all of both its intervals; an exact number is its own."""
+        if not self.over:
+            return self.value, self.value
+        return float(np.fmin(self.low, self.t_low)), float(np.fmax(self.high, self.t_high))
+
+    @property
+    def mirrored(self) -> "Number":
+        """The number with the other sign."""
+        return Number(-self.value, -self.high, -self.low, self.over, self.count, -self.t_high, -self.t_low)
 
     def __str__(self) -> str:
         text = short(self.value)
@@ -139,18 +149,19 @@ def above(number: Number, limit: float = 0.0, least: float | None = None, what: 
 
 def below(number: Number, limit: float = 0.0, least: float | None = None, what: str = "the interval") -> Answer:
     """Holds if the interval lies below the limit; not if above, or if it has the limit but no effect of `least`."""
-    answer = above(Number(-number.value, -number.high, -number.low, number.over, number.count), -limit, least)
+    answer = above(number.mirrored, -limit, least)
     no_effect = "" if least is None else f" (not, if all of it is above {short(limit - least)})"
     return Answer(answer.holds, f"{what} lies below {short(limit)}{no_effect}", answer.waits)
 
 
 def within(number: Number, low: float, high: float, what: str = "the value") -> Answer:
-    """Holds if the value lies in a range; not if the whole interval lies outside."""
+    """Holds if the whole interval lies in a range; not if all of it lies outside."""
     rule = f"{what} lies between {short(low)} and {short(high)}"
     if not number.decides:
         return Answer(None, rule, waits=True)
+    inside = low <= number.ends[0] and number.ends[1] <= high
     outside = number.ends[1] < low or number.ends[0] > high
-    return Answer(True if low <= number.value <= high else False if outside else None, rule)
+    return Answer(True if inside else False if outside else None, rule)
 
 
 def equals(value: float, wanted: float, what: str) -> Answer:

@@ -6,7 +6,6 @@ import pandas as pd
 from analysis.paper_claims.claim import (
     LEAST,
     QUARTER,
-    Missing,
     Number,
     Row,
     above,
@@ -94,14 +93,13 @@ def twice_the_budget(evidence):
 
 
 def selection(evidence, column: str) -> dict[str, Number]:
-    """A column of the table of selected sites: accepted, rejected and their difference within a run."""
-    runs = evidence.study("site_warming").seed.nunique()
-    evidence.replicates("main", CURRICULUM)
-    table = curriculum_selection.make(evidence.results).set_index("category")
-    if column not in table:
-        raise Missing(f"{column} of selected sites")
-    return {name: Number(row[column], row[f"{column}_low"], row[f"{column}_high"], SEEDS, runs)
-            for name, row in table.iterrows()}  # fmt: skip
+    """Means by training seed of a column of the table of selected sites: accepted, rejected and their difference."""
+    sites = evidence.study("site_warming")
+    name = {ours: theirs for theirs, ours in curriculum_selection.NUMBERS.items()}[column]
+    means = {category: sites[sites.selected == selected].groupby("seed")[name].mean()
+             for category, selected in curriculum_selection.CATEGORIES.items()}
+    means["accepted less rejected"] = means["accepted"] - means["rejected"]
+    return {category: seeds(values) for category, values in means.items()}
 
 
 @claim("Accepted sites lie north, rejected ones south of 60° N.", "Table of curriculum selection", SELECTION,
@@ -130,15 +128,17 @@ def accepted_are_safe(evidence):
 
 @claim("The threshold breathes: training expands and contracts with the agent's competence.", "Curriculum mechanism",
        MAIN,
-       why="A thousandth a rollout is little: the threshold cannot move far within the budget.")
+       why="The threshold moves one way in nearly all rollouts.",
+       note="Only directions are judged: by a thousandth a rollout, which is the paper's, the threshold cannot move "
+            "far within the budget, whichever way.")
 def threshold_breathes(evidence):
     table = evidence.by_seed(breathing, "main", CURRICULUM)
     change = seeds(table["range"])
     rows = [Row("episodes that score between the lowest and the highest threshold, in points", "", change),
             Row("lowest threshold", "", seeds(table.lowest)), Row("highest threshold", "", seeds(table.highest)),
             Row("moves up, of all moves %", "both ways", seeds(table.up))]
-    both = all_of(above(seeds(table.up), 5.0, what="moves up"), below(seeds(table.up), 95.0, what="moves up"))
-    return finding(rows, all_of(above(change, 10.0, what="their share"), both))
+    return finding(rows, all_of(above(seeds(table.up), 5.0, what="the share of moves up"),
+                                below(seeds(table.up), 95.0, what="the share of moves up")))  # fmt: skip
 
 
 def breathing(one) -> dict:

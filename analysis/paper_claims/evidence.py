@@ -26,12 +26,13 @@ def only(*experiments: str) -> str:
 
 
 def seeds(values: pd.Series) -> Number:
-    """Interquartile mean over training seeds, with its bootstrap interval; Missing if there is none."""
+    """Interquartile mean over training seeds, with its bootstrap interval and the mean's t interval."""
     known = values.dropna()
     if known.empty:
         raise Missing("a run that has the number")
     row = over_seeds(known.to_frame("x"))
-    return Number(row["x"], row["x_low"], row["x_high"], SEEDS, len(known))
+    t = mean_of(known, SEEDS)
+    return Number(row["x"], row["x_low"], row["x_high"], SEEDS, len(known), t.low, t.high)
 
 
 def difference(first: pd.Series, second: pd.Series) -> Number:

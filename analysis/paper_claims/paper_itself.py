@@ -85,8 +85,8 @@ def spreads(evidence):
 @claim("Heuristics, one point each, have hypervolumes of 11.3 to 21.4.", "Table 2",
        note="Averaged over weights that are symmetric about one half, the scalarised reward of one point is the mean "
             "of its two returns. With that mean given, the rectangle above the reference point is largest if both "
-            "returns are equal, and empty if the mean is below the reference's. A front over single episodes could be "
-            "larger.")
+            "returns are equal, and empty if the mean is below the reference's. The paper's are of single episodes, "
+            "whose front can be larger, and which are not published.")
 def heuristic_hypervolumes(evidence):
     table, rows, possible = paper("main_results"), [], []
     for row in table[table.kind == "heuristic"].itertuples():
@@ -94,7 +94,7 @@ def heuristic_hypervolumes(evidence):
         rows.append(Row(f"hypervolume, {NAMES[row.method]} (scalarised {short(row.scalarized_mean)})",
                         f"{short(row.hypervolume)} printed", f"at most {short(side**2)} as one point"))
         possible.append(row.hypervolume <= side**2)
-    return finding(rows, Answer(all(possible), "every one is possible"), CONTRADICTS)
+    return finding(rows, Answer(all(possible), "every one is possible"), UNTESTABLE)
 
 
 @claim("PPO Gated's mean returns are 7.8 and 1.5, under the asymmetric reward.", "Table 3 against the details")

@@ -48,7 +48,7 @@ def paper_change(script: str) -> tuple[float, float]:
     return tuple(table[f"{name}_mean"].iloc[-1] - table[f"{name}_mean"].iloc[0] for name in ("carbon", "thaw"))
 
 
-@claim("Curriculum PPO follows the preference.", "Figure 3d; table of detailed objectives", MAIN,
+@claim("Curriculum PPO follows the preference.", "Figure 3d; table of detailed objectives", only("main", "variants"),
        why="Both returns rise with the carbon weight: asked for thaw the agent plants less. With each objective's "
            "advantages normalised apart carbon follows the preference, and thaw more than without.")
 def curriculum_follows(evidence):
@@ -80,20 +80,28 @@ def gated_does_not_follow(evidence):
 
 
 @claim("Thaw is hard for its asymmetry and physics, not for a difference in the rewards' magnitude.",
-       "Appendix, reward function", only("main", "variants"),
-       why="With advantages normalised for each objective apart no magnitude matters, and both returns follow the "
-           "preference.",
+       "Appendix, reward function", only("main", "variants", "balanced"),
+       why="With advantages normalised for each objective apart, where no magnitude matters, agents asked for thaw "
+           "protect it better.",
        note="The scale of `boreal-balanced-v0`, at which policies move both returns alike, does not make their noise "
             "alike.")
 def magnitude_does_not_matter(evidence):
-    _, _, answer = follows(evidence, "variants", GATED, **APART)
-    rows = apart_rows(evidence)
+    equal, given = (evidence.by_seed(thaw_alone, experiment, GATED, **flags)["thaw"]
+                    for experiment, flags in (("variants", APART), ("main", {})))
+    apart = difference(equal, given)
+    rows = [Row("thaw return at weight 0, equal magnitudes less the default", "no more", apart), *apart_rows(evidence)]
     rows += [Row(f"{name}, PPO Gated in `{env}`", "", optional(lambda name=name, experiment=experiment, flags=flags:
                  seeds(change(evidence, name, experiment, GATED, **flags))))
              for env, experiment, flags in (("boreal-generalist-v0", "main", {}),
                                             ("boreal-balanced-v0", "balanced", {"env_id": "boreal-balanced-v0"}))
              for name in ("carbon", "thaw")]  # fmt: skip
-    return finding(rows, opposite(answer))
+    return finding(rows, opposite(above(apart, least=LEAST, what="the difference of thaw returns")))
+
+
+def thaw_alone(one) -> dict:
+    """Thaw return of the sampled policy at weight 0."""
+    evaluation = one.evaluation
+    return {"thaw": evaluation[evaluation.preference == 0].thaw_return.mean()}
 
 
 def violation(evidence, script: str, name: str = "violations_percent") -> pd.Series:
@@ -105,7 +113,7 @@ def violation(evidence, script: str, name: str = "violations_percent") -> pd.Ser
     return table[name].dropna()
 
 
-@claim("Curriculum PPO violates λ-monotonicity least (50 %).", "Appendix, λ-monotonicity", MAIN,
+@claim("Curriculum PPO violates λ-monotonicity least (50 %).", "Appendix, λ-monotonicity", only("main", "fixed"),
        why="Both returns of the PPOs rise with the carbon weight, which thaw's must not; EUPG's do not move.",
        note="The paper counts a return that fails to increase, ties included, and so does the verdict; without ties, "
             "one that moves the wrong way counts. In random order: the same points, shuffled. Beyond their interval: "
@@ -140,8 +148,11 @@ def gated_always_violates(evidence):
     return finding(rows, about(ours, papers))
 
 
-@claim("Curriculum PPO's preference control is better than chance.", "Appendix, λ-monotonicity (our control)", MAIN,
-       why="The policy hardly differs between weights.")
+@claim("Curriculum PPO violates λ-monotonicity less than its own points in random order.",
+       "Appendix, λ-monotonicity (our control)", MAIN,
+       why="The policy hardly differs between weights.",
+       note="That the order of the weights is not a random one is not yet that the preference is followed, which is "
+            "judged above.")
 def curriculum_beats_chance(evidence):
     apart = difference(violation(evidence, CURRICULUM), violation(evidence, CURRICULUM, "noise_violations_percent"))
     return finding([Row("violations %, less those in random order", "", apart)], below(apart, what="the difference"))
