@@ -69,13 +69,13 @@ t interval, and has no training in it. Protection is less heat through the bound
 pairs of stands are compared the active layer stands beside it.
 
 **Verdicts.** A claim that one thing is more than another is reproduced if the whole interval of the difference has its
-sign; it is not if the interval has the other sign, or includes zero and no effect worth the name: of a return a quarter
-of what the best constant plans gain over doing nothing, of what has the paper's units a quarter of its effect. Only
-signs are judged: how large the paper's difference is stands beside ours. A value or a range is reproduced if all of our
-interval lies in it, give or take a tenth, and not if all of it lies outside. A cost (time, memory, money) is reproduced
-if ours is no larger. A claim of several parts is not reproduced if one of them is not. A bootstrap over few seeds is
-too narrow (of normal values it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five, and for
-the t interval of the seeds' mean, which is not printed, to agree. Dozens of intervals are judged one by one,
+sign; it is not if the interval has the other sign, or holds no effect worth the name: of a return a quarter of what the
+best constant plans gain over doing nothing, of what has the paper's units a quarter of its effect. Beyond that signs
+are judged, not sizes: how large the paper's difference is stands beside ours. A value or a range is reproduced if all
+of our interval lies in it, give or take a tenth, and not if all of it lies outside. A cost (time, memory, money) is
+reproduced if ours is no larger. A claim of several parts is not reproduced if one of them is not. A bootstrap over few
+seeds is too narrow (of normal values it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five,
+and for the t interval of the seeds' mean, which is not printed, to agree. Dozens of intervals are judged one by one,
 uncorrected. Those over training seeds hold for these evaluation sites: other sites are another matter. Curriculum and
 PPO Gated of one seed train on the same episodes; EUPG's batches are others, and share the evaluation alone.
 """

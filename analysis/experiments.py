@@ -142,10 +142,11 @@ def fixed_weights(seeds) -> list[Job]:
 
 
 def single_sites(seeds) -> list[Job]:
-    """EUPG trained for one weight, on one site, and its ends with a baseline; the site's seed is the training seed too.
+    """EUPG trained for one weight, on one site; the site's seed is the training seed too.
 
-    In site-specific mode every episode has the same first stand and weather: what keeps an agent from learning there
-    is no noise of sites.
+    Then its ends with a baseline, and thaw alone with the rewards to come, as morl-baselines has it. In site-specific
+    mode every episode has the same first stand and weather: what keeps an agent from learning there is no noise of
+    sites.
     """
     numbers = seeds_of(len(SITE_SEEDS), seeds)
     sites = {seed: {"mode": "site-specific", "site_seed": SITE_SEEDS[seed - 1]} for seed in numbers}
@@ -153,8 +154,9 @@ def single_sites(seeds) -> list[Job]:
     for seed, site in sites.items():
         jobs.append(Job("site", "zero_change", site))
         jobs += [trained("site", "eupg_fixed_lambda", seed, preference=weight, **site) for weight in WEIGHTS]
-    return jobs + [trained("site", "eupg_fixed_lambda", seed, preference=weight, baseline="others", **site)
-                   for seed, site in sites.items() for weight in (0.0, 1.0)]  # fmt: skip
+    others = ((0.0, {"baseline": "others"}), (1.0, {"baseline": "others"}), (0.0, {"utility": "future"}))
+    return jobs + [trained("site", "eupg_fixed_lambda", seed, preference=weight, **flags, **site)
+                   for seed, site in sites.items() for weight, flags in others]  # fmt: skip
 
 
 def thaw_formulations(seeds) -> list[Job]:

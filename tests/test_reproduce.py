@@ -13,7 +13,7 @@ from analysis import experiments, protocol, reproduce, runs
 from analysis.experiments import Job
 from cleanrl_style.ppo_gated import Args
 
-COUNTS = {"main": 37, "fixed": 25, "site": 40, "thaw": 12, "balanced": 20, "controls": 25, "variants": 40,
+COUNTS = {"main": 37, "fixed": 25, "site": 45, "thaw": 12, "balanced": 20, "controls": 25, "variants": 40,
           "mechanisms": 2, "single": 6, "difficulty": 3}
 
 
@@ -26,7 +26,7 @@ def test_experiments():
     assert [(job.script, job.flags["seed"]) for job in jobs[6:10]] == [
         ("eupg_var_lambda", 1), ("ppo_gated", 1), ("ppo_curriculum", 1), ("eupg_var_lambda", 2)]
     assert sum(job.steps for job in jobs if job.experiment == "main") == 30 * 300_000
-    assert len(experiments.jobs(["fixed", "site"], [2])) == 5 + 8
+    assert len(experiments.jobs(["fixed", "site"], [2])) == 5 + 9
 
 
 def test_a_job_knows_its_run():

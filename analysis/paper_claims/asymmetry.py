@@ -142,7 +142,7 @@ def constant_gains(evidence, weight: float) -> pd.Series:
            "agents of thaw alone gain what constant plans can, by the same physics. Over all sites a common mean is no "
            "such help, for it is the sites that differ (`docs/learning.md`).",
        note="The paper names delay and noise together; the noise of sites is judged below. morl-baselines' EUPG, which "
-            "the paper names, weighs an action by the rewards to come, which was not run here on single sites.")
+            "the paper names, weighs an action by the rewards to come.")
 def physics_hides_thaw(evidence):
     gains = {(name, baseline): mean_of(own_gains(evidence, weight, **flags), "sites")
              for name, weight in (("thaw", THAW), ("carbon", CARBON))
@@ -150,6 +150,8 @@ def physics_hides_thaw(evidence):
                                      ("`--baseline others`", {"baseline": "others"}))}  # fmt: skip
     rows = [Row(f"{name} over zero change, agents of {name} alone, {baseline}", "", number)
             for (name, baseline), number in gains.items()]
+    rows.append(Row("thaw over zero change, agents of thaw alone, rewards to come (`--utility future`)", "",
+                    optional(lambda: mean_of(own_gains(evidence, THAW, utility="future"), "sites"))))
     rows += [Row(f"{name} over zero change of the best of 25 constant plans", "",
                  optional(lambda weight=weight: mean_of(constant_gains(evidence, weight), "sites")))
              for name, weight in (("thaw", THAW), ("carbon", CARBON))]  # fmt: skip

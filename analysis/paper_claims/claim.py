@@ -137,18 +137,18 @@ def claim(statement: str, where: str, command: str = "", why: str = "", note: st
 
 
 def above(number: Number, limit: float = 0.0, least: float | None = None, what: str = "the interval") -> Answer:
-    """Holds if the interval lies above the limit; not if below, or if it has the limit but no effect of `least`."""
+    """Holds if the interval lies above the limit; not if below, or if all of it is less than `least` above it."""
     low, high = number.ends
     no_effect = "" if least is None else f" (not, if all of it is below {short(limit + least)})"
     rule = f"{what} lies above {short(limit)}{no_effect}"
     if not number.decides:
         return Answer(None, rule, waits=True)
-    fails = high <= limit or (least is not None and low <= limit and high < limit + least)
-    return Answer(True if low > limit else False if fails else None, rule)
+    fails = high <= limit or (least is not None and high < limit + least)
+    return Answer(False if fails else True if low > limit else None, rule)
 
 
 def below(number: Number, limit: float = 0.0, least: float | None = None, what: str = "the interval") -> Answer:
-    """Holds if the interval lies below the limit; not if above, or if it has the limit but no effect of `least`."""
+    """Holds if the interval lies below the limit; not if above, or if all of it is less than `least` below it."""
     answer = above(number.mirrored, -limit, least)
     no_effect = "" if least is None else f" (not, if all of it is above {short(limit - least)})"
     return Answer(answer.holds, f"{what} lies below {short(limit)}{no_effect}", answer.waits)
