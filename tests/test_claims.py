@@ -56,7 +56,8 @@ def seeds(value, low, high, count=5):
 
 @pytest.mark.parametrize(("number", "least", "holds"), [
     (seeds(1, 0.5, 2), None, True), (seeds(-1, -2, -0.5), None, False), (seeds(0.2, -1, 1), None, None),
-    (seeds(0.2, -1, 1), 3.8, False), (seeds(1, 0.5, 2), 3.8, False), (seeds(0.2, -1, 5), 3.8, None), (seeds(1, 0.5, 2, count=2), 3.8, None),
+    (seeds(0.2, -1, 1), 3.8, False), (seeds(1, 0.5, 2), 3.8, False), (seeds(0.2, -1, 5), 3.8, None),
+    (seeds(1, 0.5, 2, count=2), 3.8, None),
     (Number(1, over=SEEDS, count=1), None, None), (Number(1), None, True), (Number(np.nan), None, None),
 ])
 def test_signs(number, least, holds):
