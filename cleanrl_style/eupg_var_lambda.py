@@ -20,14 +20,7 @@ from analysis import protocol
 
 @dataclass
 class Args:
-    """EUPG with a preference drawn for each episode: trains, evaluates, and leaves a run folder.
-
-    python cleanrl_style/eupg_var_lambda.py --vectorization lockstep --total-timesteps 3200
-
-    is a trial. Without the last flag it trains for 300,000 steps. A stopped run goes on with the same command, to the
-    same bytes. The folder gets config.json, episodes.csv, updates.csv, evaluation.csv and summary.png, which
-    docs/algorithms explains; python analysis/make_tables.py sets it beside other runs.
-    """
+    """EUPG with a preference drawn for each episode: trains, evaluates, and leaves a run folder."""
 
     seed: int = 1
     """seed of the run: agent, sampling and training episodes"""

@@ -19,14 +19,7 @@ from analysis import protocol
 
 @dataclass
 class Args:
-    """Gated PPO with a curriculum: trains on chosen episodes, evaluates, and leaves a run folder.
-
-    python cleanrl_style/ppo_curriculum.py --vectorization lockstep --total-timesteps 3200
-
-    is a trial. Without the last flag it trains for 300,000 steps. A stopped run goes on with the same command, to the
-    same bytes. The folder gets config.json, episodes.csv, updates.csv, evaluation.csv and summary.png, which
-    docs/algorithms explains; python analysis/make_tables.py sets it beside other runs.
-    """
+    """Gated PPO with a curriculum: trains on chosen episodes, evaluates, and leaves a run folder."""
 
     seed: int = 1
     """seed of the run: agent, sampling and training episodes"""
@@ -206,27 +199,26 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value
 class Curriculum:
     """Chooses the episodes to train on: those that a fixed random network of the site, or a coin, scores above tau.
 
-    Where there is nothing to choose by, the network accepts all episodes: in environments without the 62 site
-    observations (site-specific mode), and with one site in all episodes.
+    On one site, and without the 62 site observations (site-specific mode), the network accepts all episodes.
     """
     NUM_SITE_INPUTS = 62
 
-    def __init__(self, observation_dim, seed, threshold, raw, selector, one_site=False):
-        self.coin = np.random.default_rng([seed, 1]) if selector == "coin" else None
-        sees_sites = observation_dim == len(boreal_env.OBSERVATION_NAMES) and not one_site
+    def __init__(self, observation_dim, args):
+        self.coin = np.random.default_rng([args.seed, 1]) if args.selector == "coin" else None
+        sees_sites = args.site_seed is None and observation_dim == len(boreal_env.OBSERVATION_NAMES)
         self.accepts_all = self.coin is None and not sees_sites
-        self.threshold = 0.0 if self.accepts_all else threshold
+        self.threshold = 0.0 if self.accepts_all else args.threshold
         # a generator of its own: the agent is the one that ppo_gated starts from
-        generator = np.random.default_rng(seed)
+        generator = np.random.default_rng(args.seed)
         sizes = (self.NUM_SITE_INPUTS, 64, 64, 1)
         self.layers = [generator.normal(0, n**-0.5, (n, m)) for n, m in zip(sizes[:-1], sizes[1:], strict=True)]
         self.mean, self.std = 0.0, 1.0
-        if not raw and self.coin is None and not self.accepts_all:
+        if not args.raw_selector and self.coin is None and not self.accepts_all:
             logits = self.logit(boreal_env.sample_site_observations(range(1000)))
             self.mean, self.std = logits.mean(), logits.std()
         # sum and number of the returns seen so far in each tenth of the preference
         self.decile_sum, self.decile_count = np.zeros(10), np.zeros(10)
-        self.finished, self.num_transitions = [], 0
+        self.finished = []
 
     def logit(self, sites):
         for layer in self.layers[:-1]:
@@ -299,8 +291,7 @@ if __name__ == "__main__":
         next_done = np.zeros(args.num_envs, dtype=bool)
         episode_returns = np.zeros((args.num_envs, 2))
         # CURRICULUM: of the episode under way in each environment
-        curriculum = Curriculum(next_obs.shape[1], args.seed, args.threshold, args.raw_selector, args.selector,
-                                one_site=args.site_seed is not None)
+        curriculum = Curriculum(next_obs.shape[1], args)
         scores, thresholds = curriculum.score(next_obs), np.full(args.num_envs, curriculum.threshold)
         selected = scores > thresholds
 
@@ -412,10 +403,9 @@ if __name__ == "__main__":
                 np.random.shuffle(b_inds)
                 for minibatch in range(num_minibatches):
                     mb_inds = b_inds[minibatch::num_minibatches]
-                    parts = ppo_losses(
-                        agent, b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds], b_logprobs[mb_inds],
-                        b_advantages[mb_inds], b_returns[mb_inds], b_values[mb_inds], args
-                    )
+                    parts = ppo_losses(agent, b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds],
+                                       b_logprobs[mb_inds], b_advantages[mb_inds], b_returns[mb_inds],
+                                       b_values[mb_inds], args)
                     pg_loss, v_loss, entropy = parts[:3]
                     loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
 
@@ -432,7 +422,6 @@ if __name__ == "__main__":
             if len(y_true) > 1:
                 row["explained_variance"] = (1 - (y_true - y_pred).var(dim=0).sum() / y_true.var(dim=0).sum()).item()
             # CURRICULUM: the threshold of the next rollout's episodes
-            curriculum.num_transitions += len(b_inds)
             num_selected, num_skipped = curriculum.update_threshold()
             row |= {"threshold": curriculum.threshold, "selected_episodes": num_selected,
                     "skipped_episodes": num_skipped, "selected_transitions": len(b_inds)}
@@ -440,20 +429,15 @@ if __name__ == "__main__":
             run.log("updates", row)
             run.time("update", global_step, time.perf_counter() - update_start)
 
-            state = {
-                "agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
-                "episode": episode, "next_obs": next_obs, "next_done": next_done, "episode_returns": episode_returns,
-            }
+            state = {"agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
+                     "episode": episode, "next_obs": next_obs, "next_done": next_done,
+                     "episode_returns": episode_returns}
             # CURRICULUM
             state |= {"curriculum": vars(curriculum), "scores": scores, "thresholds": thresholds, "selected": selected}
 
             run.save(global_step, last=iteration == num_iterations, **state)
 
         envs.close()
-        # CURRICULUM
-        if not curriculum.num_transitions:
-            print(f"warning: no episode scored above the threshold of {curriculum.threshold:g}: the agent that is "
-                  "evaluated is untrained", flush=True)
 
         def action_probabilities(observations, masks, accrued_returns):
             with torch.no_grad():

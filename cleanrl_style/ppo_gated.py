@@ -19,14 +19,7 @@ from analysis import protocol
 
 @dataclass
 class Args:
-    """Gated PPO on the boreal forest environments: trains, evaluates, and leaves a run folder.
-
-    python cleanrl_style/ppo_gated.py --vectorization lockstep --total-timesteps 3200
-
-    is a trial. Without the last flag it trains for 300,000 steps. A stopped run goes on with the same command, to the
-    same bytes. The folder gets config.json, episodes.csv, updates.csv, evaluation.csv and summary.png, which
-    docs/algorithms explains; python analysis/make_tables.py sets it beside other runs.
-    """
+    """Gated PPO on the boreal forest environments: trains, evaluates, and leaves a run folder."""
 
     seed: int = 1
     """seed of the run: agent, sampling and training episodes"""
@@ -320,10 +313,9 @@ if __name__ == "__main__":
                 np.random.shuffle(b_inds)
                 for minibatch in range(num_minibatches):
                     mb_inds = b_inds[minibatch::num_minibatches]
-                    parts = ppo_losses(
-                        agent, b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds], b_logprobs[mb_inds],
-                        b_advantages[mb_inds], b_returns[mb_inds], b_values[mb_inds], args
-                    )
+                    parts = ppo_losses(agent, b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds],
+                                       b_logprobs[mb_inds], b_advantages[mb_inds], b_returns[mb_inds],
+                                       b_values[mb_inds], args)
                     pg_loss, v_loss, entropy = parts[:3]
                     loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
 
@@ -343,10 +335,9 @@ if __name__ == "__main__":
             run.log("updates", row)
             run.time("update", global_step, time.perf_counter() - update_start)
 
-            state = {
-                "agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
-                "episode": episode, "next_obs": next_obs, "next_done": next_done, "episode_returns": episode_returns,
-            }
+            state = {"agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
+                     "episode": episode, "next_obs": next_obs, "next_done": next_done,
+                     "episode_returns": episode_returns}
 
             run.save(global_step, last=iteration == num_iterations, **state)
 

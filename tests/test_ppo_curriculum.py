@@ -120,7 +120,7 @@ def test_advantages_are_normalised_per_objective_then_weighed():
 
 
 def make_curriculum(raw=False, seed=1, size=OBSERVATIONS, selector="network"):
-    return Curriculum(size, seed, 0.5, raw, selector)
+    return Curriculum(size, Args(seed=seed, raw_selector=raw, selector=selector))
 
 
 def test_scores_are_centred_and_scaled_over_sampled_sites():
@@ -159,11 +159,6 @@ def test_one_site_in_all_episodes_is_accepted(tmp_path):
     run_script(SCRIPT, "--site-seed", 2, "--vectorization", "lockstep", "--num-envs", 2, "--rollout-steps", 100,
                "--total-timesteps", 100, "--eval-episodes", 1, "--eval-weights", 0.5, "--run-dir", tmp_path)
     assert pd.read_csv(tmp_path / "updates.csv").selected_transitions.tolist() == [100]
-
-
-def test_an_agent_without_a_selected_episode_is_said_to_be_untrained(tmp_path, capsys):
-    train(tmp_path, "--threshold", 1)
-    assert "warning: no episode scored above the threshold of 1: the agent that" in capsys.readouterr().out
 
 
 def test_a_coin_accepts_half_whatever_the_site():

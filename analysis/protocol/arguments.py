@@ -44,12 +44,25 @@ def fail(message: str):
     sys.exit(f"error: {message}")
 
 
+def describe(arguments: type) -> str:
+    """What `--help` says of a script: of one that trains how to try it, and what becomes of it."""
+    if not hasattr(arguments, "total_timesteps"):
+        return arguments.__doc__
+    return f"""{arguments.__doc__}
+
+    python {sys.argv[0]} --vectorization lockstep --total-timesteps 3200
+
+is a trial. Without the last flag it trains for 300,000 steps. A stopped run goes on with the same command, to the same
+bytes. The folder gets config.json, episodes.csv, updates.csv, evaluation.csv and summary.png, which docs/algorithms
+explains; python analysis/make_tables.py sets it beside other runs."""
+
+
 def parse(arguments: type):
     """The command line as an instance of `arguments`; a bad flag or value ends the script with one line."""
     errors = io.StringIO()
     try:
         with contextlib.redirect_stderr(errors):
-            return tyro.cli(arguments)
+            return tyro.cli(arguments, description=describe(arguments))
     except SystemExit as end:
         if not end.code:
             raise
