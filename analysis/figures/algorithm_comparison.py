@@ -11,6 +11,7 @@ from analysis.figures.common import (
     STEPS,
     finish,
     learning_curve,
+    legend,
     mean_front,
     methods,
     panels,
@@ -42,16 +43,17 @@ def draw(figure, results) -> None:
         bars.plot(np.full(len(means), k), means, "o", color="black", markersize=2)
     bars.set_xticks(range(len(scripts)), [TITLES[script] for script in scripts], rotation=40, ha="right")
     bars.axhline(0, color="black", linewidth=0.5)
-    finish(bars, legend=False, ylabel="mean scalarised return")
+    finish(bars, ylabel="mean scalarised return")
 
     for script in (*METHODS, *HEURISTICS):
         if not wanting(trade_offs, results, "main", script):
             front = mean_front(results.of("main", script))
             trade_offs.plot(front.thaw_return, front.carbon_return, MARKERS[script], color=COLOURS[script],
                             label=TITLES[script], markersize=5)  # fmt: skip
-    finish(trade_offs, legend_size=5.5, **RETURNS)
+    finish(trade_offs, **RETURNS)
 
     if not wanting(curriculum, results, "main", "ppo_curriculum"):
         points = weight_points(curriculum, results.of("main", "ppo_curriculum"))
         figure.colorbar(points, ax=curriculum, label="weight of carbon")
-    finish(curriculum, legend=False, **RETURNS)
+    finish(curriculum, **RETURNS)
+    legend(figure, [learning, trade_offs], ncols=4)

@@ -76,8 +76,8 @@ def wanting(ax, results, experiment: str, script: str) -> bool:
     return True
 
 
-def finish(ax, legend: bool = True, legend_size: float = 7, **labels) -> None:
-    """Labels and legend of a panel; one that has drawn nothing names its commands, one that lacks some too."""
+def finish(ax, **labels) -> None:
+    """Labels of a panel; one that has drawn nothing names its commands, one that lacks some too."""
     wanted = getattr(ax, "wanted", [])
     if not ax.has_data():
         no_data(ax, *(job.command for job in wanted))
@@ -92,8 +92,16 @@ def finish(ax, legend: bool = True, legend_size: float = 7, **labels) -> None:
         note = [*textwrap.wrap("no run yet: " + ", ".join(job.script for job in wanted), 60),
                 f"(python analysis/reproduce.py --only {experiments})"]  # fmt: skip
         ax.text(0.99, 0.01, "\n".join(note), transform=ax.transAxes, ha="right", va="bottom", fontsize=5)
-    if legend:
-        ax.legend(fontsize=legend_size)
+
+
+def legend(where, axes, loc="outside upper center", ncols: int = 5) -> None:
+    """One legend for all panels, off their data; a label takes the look that it has in the last of the axes.
+
+    where : the figure, or axes that show nothing else
+    """
+    handles = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    if handles:
+        where.legend(handles.values(), handles.keys(), loc=loc, ncols=ncols)
 
 
 # ------------------------------------------------------------------------------------------------- curves

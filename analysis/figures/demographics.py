@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from analysis.figures.common import COLOURS, SEEDS_95, finish, letter, methods, year_curve
+from analysis.figures.common import COLOURS, SEEDS_95, finish, legend, letter, methods, year_curve
 
 SIZE = (7, 7)
 CAPTION = (f"(a-e) evaluation, mean over the weights 0, 0.5 and 1; solid: conifers, dashed: deciduous; {SEEDS_95}. "
@@ -16,7 +16,8 @@ def draw(figure, results) -> None:
     """Five panels of ages, two of conifer fractions."""
     upper, lower = figure.subfigures(2, 1, height_ratios=(2, 1))
     axes = list(upper.subplots(2, 3).flat)
-    axes.pop().set_visible(False)
+    free = axes.pop()
+    free.axis("off")
     axes += list(lower.subplots(1, 2).flat)
     letter(axes, [*CLASSES.values(), "conifer fraction, training", "conifer fraction, evaluation"])
     for ax, age in zip(axes[:5], CLASSES, strict=True):
@@ -24,23 +25,23 @@ def draw(figure, results) -> None:
             for species, style in (("conifer", "-"), ("deciduous", "--")):
                 label = title if species == "conifer" else None
                 year_curve(ax, results.of("main", script), f"{species}_{age}_stems_ha", COLOURS[script], label, style)
-        finish(ax, legend=ax is axes[0], xlabel="year", ylabel="stems/ha", ylim=(0, None))
+        finish(ax, xlabel="year", ylabel="stems/ha", ylim=(0, None))
 
     training, evaluation = axes[5:]
-    for script, title in methods(training, results):
+    for script, _ in methods(training, results):
         episodes = [one.runs[0].episodes for one in results.of("main", script)]
         last = [table.final_conifer_fraction[table.global_step > 0.8 * table.global_step.max()] for table in episodes]
-        training.hist(np.concatenate(last), np.linspace(0, 1, 41), density=True, histtype="step", label=title,
-                      color=COLOURS[script])  # fmt: skip
+        training.hist(np.concatenate(last), np.linspace(0, 1, 41), density=True, histtype="step", color=COLOURS[script])
     finish(training, xlabel="conifer fraction after 50 years", ylabel="density of episodes")
     height = 0
-    for script, title in methods(evaluation, results):
+    for script, _ in methods(evaluation, results):
         for one in results.of("main", script):
             years = one.years(["conifer_fraction"])
             for row in years[years.year == years.year.max()].sort_values("preference").itertuples():
-                evaluation.plot([row.p10, row.p90], [height, height], color=COLOURS[script], label=title, linewidth=1)
+                evaluation.plot([row.p10, row.p90], [height, height], color=COLOURS[script], linewidth=1)
                 evaluation.plot(row.p50, height, "|", color=COLOURS[script], markersize=4)
-                title, height = None, height - 1
+                height -= 1
         height -= 2
     finish(evaluation, xlabel="conifer fraction after 50 years", xlim=(0, 1))
     evaluation.set_yticks([])
+    legend(free, axes[:1], "center", 1)

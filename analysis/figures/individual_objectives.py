@@ -11,6 +11,7 @@ from analysis.figures.common import (
     band,
     finish,
     learning_curve,
+    legend,
     methods,
     panels,
 )
@@ -32,3 +33,4 @@ def draw(figure, results) -> None:
             fronts = [metrics.mean_returns(one.evaluation)[column] for one in results.of("main", script)]
             band(ax, fronts[0].index, np.array(fronts), COLOURS[script], title, marker=MARKERS[script])
         finish(ax, xlabel="weight of carbon", ylabel=label)
+    legend(figure, axes)

@@ -8,6 +8,7 @@ from analysis.figures.common import (
     WEIGHT_COLOURS,
     finish,
     learning_curve,
+    legend,
     letter,
     no_data,
     training_curve,
@@ -46,11 +47,9 @@ def draw(figure, results) -> None:
                 gain_curve(ax, of_weight, nothing, column, colours(0.9 * weight))
             else:
                 learning_curve(ax, of_weight, column, colours(0.9 * weight), f"weight of carbon {weight:g}")
-        finish(ax, legend=False, ylabel=label, **STEPS)
+        finish(ax, ylabel=label, **STEPS)
     site_gains(alone, results, colours)
-    handles, labels = axes[0].get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=6)
+    legend(figure, axes[:1])
 
 
 def site_gains(ax, results, colours) -> None:
@@ -69,4 +68,4 @@ def site_gains(ax, results, colours) -> None:
             tables = [run.episodes.assign(gain=run.episodes[objective]
                                           - zero[run.arguments["site_seed"]][objective].mean()) for run in of_weight]
             training_curve(ax, tables, "gain", steps, colours(0.9 * weight), None, style=style)
-    finish(ax, legend=False, ylabel="gain in the own objective", **STEPS)
+    finish(ax, ylabel="gain in the own objective", **STEPS)

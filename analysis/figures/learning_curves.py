@@ -8,6 +8,7 @@ from analysis.figures.common import (
     STEPS,
     finish,
     learning_curve,
+    legend,
     methods,
     no_data,
     panels,
@@ -44,10 +45,8 @@ def draw(figure, results) -> None:
             for label, colour, values in levels:
                 style = ":" if label == BEST else "--"
                 ax.axhline(values[f"{name}_{kind}"], color=colour, linestyle=style, linewidth=0.9, label=label)
-            finish(ax, legend=False, ylabel=f"{QUANTITIES[name]} {kind}", **STEPS)
-    handles, labels = axes[0].get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside upper center", ncols=4, fontsize=6)
+            finish(ax, ylabel=f"{QUANTITIES[name]} {kind}", **STEPS)
+    legend(figure, axes[:1])
 
 
 def gain_curve(ax, replicates, nothing, column: str, colour) -> None:

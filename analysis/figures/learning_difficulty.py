@@ -95,7 +95,7 @@ def draw_course(ax, years) -> None:
         weight = WEIGHTINGS[name] ** after
         ax.plot(after, weight, style, color="black", linewidth=1, label=f"weight of the year's reward, {name}")
     ax.axhline(0, color="#999999", linewidth=0.5)
-    finish(ax, legend=False, xlabel="years after the action", ylabel="share of the whole effect; weight")
+    finish(ax, xlabel="years after the action", ylabel="share of the whole effect; weight")
     ax.legend(ncol=2, loc="upper center", bbox_to_anchor=(0.45, -0.2), fontsize=6)
 
 

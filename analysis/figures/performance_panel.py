@@ -10,6 +10,7 @@ from analysis.figures.common import (
     binned,
     by_year,
     finish,
+    legend,
     mean_front,
     methods,
     panels,
@@ -41,12 +42,13 @@ def draw(figure, results) -> None:
         evaluation.plot(front.thaw_return, front.carbon_return, MARKERS[script], color=COLOURS[script], label=title)
     finish(evaluation, **RETURNS)
     season_curves(season, results)
-    for k, (script, title) in enumerate(methods(ages, results)):
+    for k, (script, _) in enumerate(methods(ages, results)):
         stems = np.array([sum(by_year(results.of("main", script), f"{species}_{age}_stems_ha")[:, -1]
                               for species in ("conifer", "deciduous")) for age in CLASSES])  # fmt: skip
         ages.bar(np.arange(len(CLASSES)) + 0.27 * (k - 1), stems.mean(axis=1), 0.25, yerr=stems.std(axis=1),
-                 color=COLOURS[script], label=title, error_kw={"linewidth": 0.6})  # fmt: skip
+                 color=COLOURS[script], error_kw={"linewidth": 0.6})  # fmt: skip
     ages.set_xticks(range(len(CLASSES)), CLASSES)
     finish(ages, ylabel="stems/ha")
+    legend(figure, [training, season])
 
 

@@ -1,7 +1,7 @@
 """How far the site decides about thaw, and how much the returns of training episodes scatter for it."""
 
 import sim
-from analysis.figures.common import COLOURS, MARKERS, SEEDS_95, STEPS, finish, learning_curve, methods, panels
+from analysis.figures.common import COLOURS, MARKERS, SEEDS_95, STEPS, finish, learning_curve, legend, methods, panels
 from analysis.studies import open_loop
 
 SIZE = (7, 3)
@@ -22,3 +22,4 @@ def draw(figure, results) -> None:
     for script, title in methods(volatility, results):
         learning_curve(volatility, results.of("main", script), "thaw_return", COLOURS[script], title, statistic="std")
     finish(volatility, ylabel="standard deviation of thaw returns", **STEPS)
+    legend(figure, [volatility, sites])

@@ -1,6 +1,16 @@
 """What each method does with the stands of the evaluation."""
 
-from analysis.figures.common import COLOURS, MARKERS, SEEDS_95, finish, methods, panels, season_curves, year_curve
+from analysis.figures.common import (
+    COLOURS,
+    MARKERS,
+    SEEDS_95,
+    finish,
+    legend,
+    methods,
+    panels,
+    season_curves,
+    year_curve,
+)
 
 SIZE = (7, 5.2)
 CAPTION = (f"Evaluation, means over 100 episodes and the weights 0, 0.5 and 1; {SEEDS_95}. (c) last year: median, and "
@@ -17,7 +27,7 @@ def draw(figure, results) -> None:
         for script, title in methods(ax, results):
             year_curve(ax, results.of("main", script), variable, COLOURS[script], title)
         finish(ax, xlabel="year", ylabel=label)
-    for script, title in methods(composition, results):
+    for script, _ in methods(composition, results):
         for one in results.of("main", script):
             years = one.years(["density_stems_ha", "conifer_fraction"])
             last = years[years.year == years.year.max()].pivot(index="preference", columns="variable",
@@ -26,7 +36,7 @@ def draw(figure, results) -> None:
             spread = {name: [last["p50"][column] - last["p10"][column], last["p90"][column] - last["p50"][column]]
                       for name, column in (("xerr", "density_stems_ha"), ("yerr", "conifer_fraction"))}  # fmt: skip
             composition.errorbar(x, y, **spread, fmt=MARKERS[script], color=COLOURS[script], linewidth=0.5,
-                                 markersize=4, label=title)  # fmt: skip
-            title = None
+                                 markersize=4)  # fmt: skip
     finish(composition, xlabel="stems/ha", ylabel="conifer fraction", ylim=(0, 1))
     season_curves(season, results)
+    legend(figure, [species, season])

@@ -16,6 +16,6 @@ def draw(figure, results) -> None:
     for ax, (script, experiment) in zip(axes, PANELS.items(), strict=True):
         if not wanting(ax, results, experiment, script):
             points = weight_points(ax, results.of(experiment, script))
-        finish(ax, legend=False, **RETURNS)
+        finish(ax, **RETURNS)
     if points is not None:
         figure.colorbar(points, ax=axes, label="weight of carbon", shrink=0.7)

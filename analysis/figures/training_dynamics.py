@@ -1,6 +1,6 @@
 """What the methods do with stands while they train."""
 
-from analysis.figures.common import COLOURS, SEEDS_95, STEPS, finish, learning_curve, methods, panels
+from analysis.figures.common import COLOURS, SEEDS_95, STEPS, finish, learning_curve, legend, methods, panels
 
 SIZE = (7, 2.9)
 CAPTION = f"Training episodes; {SEEDS_95}."
@@ -14,3 +14,4 @@ def draw(figure, results) -> None:
         for script, title in methods(ax, results):
             learning_curve(ax, results.of("main", script), column, COLOURS[script], title)
         finish(ax, ylabel=label, **STEPS)
+    legend(figure, [species])
