@@ -16,7 +16,7 @@ import pandas as pd
 
 from analysis import experiments, metrics, protocol, runs
 from analysis.results import METHODS, TITLES, Results
-from analysis.tables import distance_to_best, main_results
+from analysis.tables import distance_to_best, main_results, single_sites
 from analysis.tables.common import GENERALIST, over_seeds
 
 PAGES = ("README.md", "docs/learning.md",
@@ -119,10 +119,19 @@ def distances(results: Results) -> str:
     return text
 
 
+def sites_alone(results: Results) -> str:
+    """Gains of agents of one objective on each of the single sites, and of the best constant plan there."""
+    columns = single_sites.COLUMNS
+    text = "| " + " | ".join(columns.values()) + " |\n" + "|---" * len(columns) + "|\n"
+    for _, (site, *gains) in single_sites.make(results)[list(columns)].iterrows():
+        text += "| " + " | ".join([site, *("" if np.isnan(gain) else f"{gain:.2f}" for gain in gains)]) + " |\n"
+    return text
+
+
 def section(results: Results, name: str) -> str:
-    """What stands between the comments: of all methods, of the heuristics, of one script, or the distances."""
-    if name == "distances":
-        return distances(results)
+    """What stands between the comments: of all methods, of the heuristics, of one script, or one of two tables."""
+    if name in TABLES:
+        return TABLES[name](results)
     rows = []
     if name == "all":
         for script in (*experiments.TRAINED, *experiments.HEURISTICS):
@@ -139,6 +148,9 @@ def section(results: Results, name: str) -> str:
         return "No runs yet.\n"
     what = "method" if name in ("all", "heuristics") else "flags"
     return HEADING.format(what=what) + "".join(line(*row) for row in rows)
+
+
+TABLES = {"distances": distances, "single_sites": sites_alone}
 
 
 def main(args: Args) -> None:

@@ -24,6 +24,7 @@ from analysis.tables import (
     main_results,
     physical_conflicts,
     runtime,
+    single_sites,
     thaw_formulations,
     warming_flux,
 )
@@ -31,7 +32,7 @@ from analysis.tables.common import readable, write_table
 
 TABLES = (main_results, thaw_formulations, growing_season_correlations, learned_strategies, warming_flux,
           physical_conflicts, curriculum_selection, detailed_objectives, lambda_violations, runtime,
-          learning_difficulty, distance_to_best)  # fmt: skip
+          learning_difficulty, single_sites, distance_to_best)  # fmt: skip
 
 
 @dataclass

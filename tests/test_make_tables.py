@@ -7,11 +7,18 @@ import pandas as pd
 import pytest
 from tiny_runs import TINY_RUNS, write_run
 
+import boreal_env
 from analysis import experiments, make_tables, results
 from analysis.results import Results
 from analysis.studies import stored
 from analysis.studies.signal_to_noise import CONTRASTS
-from analysis.tables import curriculum_selection, growing_season_correlations, learning_difficulty, physical_conflicts
+from analysis.tables import (
+    curriculum_selection,
+    growing_season_correlations,
+    learning_difficulty,
+    physical_conflicts,
+    single_sites,
+)
 
 MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")
 
@@ -96,7 +103,7 @@ def test_season_violations_runtime_details(tables):
 
 
 def test_all_tables_in_all_formats(tables):
-    assert len(make_tables.TABLES) == 12
+    assert len(make_tables.TABLES) == 13
     for module in make_tables.TABLES:
         stem = tables / make_tables.name_of(module)
         rows = len(pd.read_csv(stem.with_suffix(".csv")))
@@ -299,6 +306,27 @@ def test_curriculum_selection():
     table = curriculum_selection.make(Studies(sites)).set_index("category")
     assert table.latitude.tolist() == [61, 59, 2] and table.warming.tolist() == [5, 9, -4]
     assert table.paper_warming.dropna().tolist() == [0.5, 8.0]
+
+
+def test_single_sites(tmp_path):
+    jobs = [job for job in experiments.jobs(seeds=[1, 2]) if job.experiment == "site" and not job.is_study]
+    for number, job in enumerate(jobs):
+        if not job.trains:
+            flags = {"env_id": job.env_id, "carbon": (1, 1, 1), "thaw": (2, 2, 2)} | job.flags
+            write_run(tmp_path / str(number), job.script, **flags)
+        elif job.flags.get("baseline") == "others" and job.flags["site_seed"] == 1:
+            flags = {"env_id": job.env_id, "weights": (job.flags["preference"],)} | job.flags
+            write_run(tmp_path / str(number), job.script, carbon=(5,), thaw=(7,), **flags)
+    studies = tmp_path / "studies"
+    plans = pd.DataFrame({"site_seed": 1, "action": [boreal_env.NO_CHANGE, 24], "carbon_return": [1, 4],
+                          "thaw_return": [1, 2]})  # fmt: skip
+    stored.write(studies / "constant_plans_of_sites.csv", plans, {})
+    table = single_sites.make(Results((tmp_path,), jobs, studies)).set_index("site_seed")
+    assert table.index.tolist() == ["1", "mean"]
+    row = table.loc["1"]
+    assert (row.thaw_baseline, row.carbon_baseline) == (7 - 2, 5 - 1)
+    assert (row.thaw_plan, row.carbon_plan) == (1, 3)
+    assert np.isnan(row.thaw_eupg) and np.isnan(row.thaw_future)
 
 
 def test_studies_leave_out_nothing_silently(tmp_path):

@@ -22,6 +22,7 @@ from analysis.paper_claims.claim import (
 )
 from analysis.paper_claims.evidence import VARIANCE, difference, first_and_last, mean_of, only, optional, seeds
 from analysis.studies.constant_plans import as_evaluation, best_gains
+from analysis.tables import single_sites
 from analysis.tables.common import GENERALIST
 
 TITLE = "Learning one objective at a time"
@@ -121,12 +122,10 @@ def asymmetry_on_single_sites(evidence):
 
 def own_gains(evidence, weight: float, **flags) -> pd.Series:
     """Gain over zero change in what an agent of one weight was trained for, by the site that it was trained on."""
-    tables = {one.runs[0].arguments["site_seed"]: one.gains
-              for one in evidence.replicates("site", "eupg_fixed_lambda", **flags) if one.gains is not None}
-    if not tables:
+    gains = single_sites.own_gains(evidence.replicates("site", "eupg_fixed_lambda", **flags), weight)
+    if gains.empty:
         raise Missing("zero_change on these sites")
-    return pd.Series({site: table[table.preference == weight][OBJECTIVE[weight]].mean()
-                      for site, table in tables.items()})
+    return gains
 
 
 def constant_gains(evidence, weight: float) -> pd.Series:

@@ -1,0 +1,45 @@
+"""Agents of one objective alone on single sites, where all episodes are one: with a baseline, without, and the plans.
+
+Gains are over zero change in the evaluation, in the objective that the agent was trained for.
+"""
+
+import numpy as np
+import pandas as pd
+
+from analysis.studies import constant_plans
+
+TITLE = "Single sites"
+OBJECTIVES = {"thaw": 0.0, "carbon": 1.0}  # -> the weight that is this objective alone
+VARIANTS = {"eupg": {}, "baseline": {"baseline": "others"}, "future": {"utility": "future"}}
+COLUMNS = {
+    "site_seed": "site seed",
+    "thaw_eupg": "thaw gain, EUPG",
+    "thaw_baseline": "baseline (others)",
+    "thaw_future": "utility (future)",
+    "thaw_plan": "best constant plan",
+    "carbon_eupg": "carbon gain, EUPG",
+    "carbon_baseline": "baseline (others)",
+    "carbon_plan": "best constant plan",
+}
+
+
+def own_gains(replicates, weight: float) -> pd.Series:
+    """Gain over zero change of the agents of one weight, 0 or 1, in that objective, by the site of their training."""
+    objective = f"{next(name for name, alone in OBJECTIVES.items() if alone == weight)}_return"
+    tables = {one.runs[0].arguments["site_seed"]: one.gains for one in replicates if one.gains is not None}
+    gains = {site: table[table.preference == weight][objective].mean() for site, table in tables.items()}
+    return pd.Series(gains, dtype=float).dropna()
+
+
+def make(results) -> pd.DataFrame:
+    """One row per site, and their mean."""
+    plans, columns = results.study("constant_plans_of_sites"), {}
+    for name, weight in OBJECTIVES.items():
+        for variant, flags in VARIANTS.items():
+            columns[f"{name}_{variant}"] = own_gains(results.of("site", "eupg_fixed_lambda", **flags), weight)
+        columns[f"{name}_plan"] = constant_plans.best_gains(plans, f"{name}_return") if plans is not None else np.nan
+    table = pd.DataFrame(columns, index=sorted(set().union(*(column.index for column in columns.values()
+                                                             if isinstance(column, pd.Series)))))  # fmt: skip
+    table = table[[name for name in COLUMNS if name in table]]
+    mean = table.mean().to_frame("mean").T
+    return pd.concat([table, mean]).rename_axis("site_seed").reset_index().astype({"site_seed": str})
