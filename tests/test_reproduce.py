@@ -13,7 +13,7 @@ from analysis import experiments, protocol, reproduce, runs
 from analysis.experiments import Job
 from cleanrl_style.ppo_gated import Args
 
-COUNTS = {"main": 37, "fixed": 25, "site": 45, "thaw": 12, "balanced": 20, "controls": 25, "variants": 40,
+COUNTS = {"main": 37, "fixed": 25, "site": 45, "thaw": 12, "balanced": 20, "controls": 20, "variants": 40,
           "mechanisms": 2, "single": 6, "difficulty": 3}
 
 

@@ -22,7 +22,6 @@ from analysis.tables import curriculum_selection
 TITLE = "What of the curriculum it is that helps"
 CONTROLS, MAIN, SELECTION = only("main", "controls"), only("main"), only("main", "mechanisms")
 PAPERS = published(CURRICULUM).scalarized_mean - published(GATED).scalarized_mean
-NO_DIFFERENCE = "An episode that is not trained on costs as much simulation as one that is, and teaches nothing."
 
 
 def control(evidence, script: str, **flags) -> pd.Series:
@@ -85,13 +84,6 @@ def more_data(evidence):
                     control(evidence, GATED, budget=2.0))
 
 
-@claim("The curriculum's lead holds with twice the budget for both.", "Section 4.3 (our control)", CONTROLS,
-       why=NO_DIFFERENCE)
-def twice_the_budget(evidence):
-    return compared("Curriculum, twice the budget", control(evidence, CURRICULUM, budget=2.0),
-                    "no selection, twice the budget", control(evidence, GATED, budget=2.0))
-
-
 def selection(evidence, column: str) -> dict[str, Number]:
     """Means by training seed of a column of the table of selected sites: accepted, rejected and their difference."""
     sites = evidence.study("site_warming")
@@ -152,5 +144,5 @@ def breathing(one) -> dict:
             "up": 100 * (moves > 0).mean() if len(moves) else 0.0}  # fmt: skip
 
 
-CLAIMS = (same_training, coin, raw_network, more_data, twice_the_budget, accepted_lie_north,
+CLAIMS = (same_training, coin, raw_network, more_data, accepted_lie_north,
           accepted_are_safe, threshold_breathes)  # fmt: skip
