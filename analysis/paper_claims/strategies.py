@@ -43,7 +43,10 @@ def strategy(evidence, script: str, name: str) -> pd.Series:
 
 
 @claim("PPO Gated ends with the highest conifer fraction (0.75 to 0.95), Curriculum PPO with 0.6 to 0.65, EUPG with "
-       "0.35 to 0.65.", "Section 4.4, figure 4a; appendix, demographics", MAIN)
+       "0.35 to 0.65.", "Section 4.4, figure 4a; appendix, demographics", MAIN,
+       why="At equal weights the species hardly matters on average: what conifers gain in thaw they lose in carbon "
+           "(`docs/learning.md`, signal to noise). Both PPOs stay near the even mix that they start from, EUPG goes "
+           "where its seed leads.")
 def conifer_fractions(evidence):
     ours = {script: seeds(strategy(evidence, script, "final_conifer_fraction")) for script in FRACTIONS}
     rows = [Row(f"conifer fraction in the last year, {TITLES[script]}", f"{low} - {high}", ours[script])
@@ -146,7 +149,9 @@ def older_deciduous(one) -> dict:
     return {"stems": last.groupby("variable")["mean"].mean().sum()}
 
 
-@claim("Variable λ EUPG keeps most mature and old deciduous trees.", "Appendix, demographics", MAIN)
+@claim("Variable λ EUPG keeps most mature and old deciduous trees.", "Appendix, demographics", MAIN,
+       why="Its agents settle on one mix, at every weight, and mostly on one of more conifers than both PPOs end with: "
+           "fewer deciduous trees are planted that could grow old.")
 def eupg_keeps_old_trees(evidence):
     stems = {script: evidence.by_seed(older_deciduous, "main", script)["stems"] for script in FRACTIONS}
     apart = [difference(stems[EUPG], stems[other]) for other in (GATED, CURRICULUM)]
