@@ -1,6 +1,6 @@
 """Agents of one objective alone on single sites, where all episodes are one: with a baseline, without, and the plans.
 
-Gains are over zero change in the evaluation, in the objective that the agent was trained for.
+Gains are of 50-year returns over zero change in the evaluation, in the objective that the agent was trained for.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ import pandas as pd
 from analysis.studies import constant_plans
 
 TITLE = "Single sites"
-OBJECTIVES = {"thaw": 0.0, "carbon": 1.0}  # -> the weight that is this objective alone
+OBJECTIVES = {0.0: "thaw", 1.0: "carbon"}  # weight of carbon -> what it leaves alone
 VARIANTS = {"eupg": {}, "baseline": {"baseline": "others"}, "future": {"utility": "future"}}
 COLUMNS = {
     "site_seed": "site seed",
@@ -25,7 +25,7 @@ COLUMNS = {
 
 def own_gains(replicates, weight: float) -> pd.Series:
     """Gain over zero change of the agents of one weight, 0 or 1, in that objective, by the site of their training."""
-    objective = f"{next(name for name, alone in OBJECTIVES.items() if alone == weight)}_return"
+    objective = f"{OBJECTIVES[weight]}_return"
     tables = {one.runs[0].arguments["site_seed"]: one.gains for one in replicates if one.gains is not None}
     gains = {site: table[table.preference == weight][objective].mean() for site, table in tables.items()}
     return pd.Series(gains, dtype=float).dropna()
@@ -34,7 +34,7 @@ def own_gains(replicates, weight: float) -> pd.Series:
 def make(results) -> pd.DataFrame:
     """One row per site, and their mean."""
     plans, columns = results.study("constant_plans_of_sites"), {}
-    for name, weight in OBJECTIVES.items():
+    for weight, name in OBJECTIVES.items():
         for variant, flags in VARIANTS.items():
             columns[f"{name}_{variant}"] = own_gains(results.of("site", "eupg_fixed_lambda", **flags), weight)
         columns[f"{name}_plan"] = constant_plans.best_gains(plans, f"{name}_return") if plans is not None else np.nan
