@@ -3,6 +3,7 @@
 `import boreal_env` registers `boreal-generalist-v0`, `boreal-site-specific-v0` and `boreal-balanced-v0`.
 The file reads top to bottom: observation, action mask, reward, episodes, the environment, the vector environment.
 """
+
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -79,8 +80,11 @@ def _observation_table() -> tuple[Observed, ...]:
         Observed("fall_start_day", "climate", "day of year", 0, 365, *fall),
         Observed("growing_season_length", "climate", "day", 0, 200, fall[0] - start[1], fall[1] - start[0]),
     ]
-    for name, unit, scale, high in (("fire_mortality", "1", 1, 1), ("insect_mortality", "1", 1, 1),
-                                    ("drought_index", "mm", 100, 1e4)):  # fmt: skip
+    for name, unit, scale, high in (
+        ("fire_mortality", "1", 1, 1),
+        ("insect_mortality", "1", 1, 1),
+        ("drought_index", "mm", 100, 1e4),
+    ):
         table += [Observed(f"{name}_{ago}", "disturbance", unit, 0, scale, 0, high) for ago in ("1yr", "2yr")]
     table += [
         Observed("biomass_change", "carbon", "kgC m-2", 0.5, 1.0, -_CHANGE, _CHANGE),
@@ -108,9 +112,7 @@ def _observation_table() -> tuple[Observed, ...]:
         Observed("density_penalty", "penalties", "1", 0, 1.0, 0, 100),
     ]
     for name, p in sim.SITE_PARAMETERS.items():
-        table.append(
-            Observed(f"site_{name}", "site", p.unit, -p.low, p.high - p.low, p.physical_low, p.physical_high)
-        )
+        table.append(Observed(f"site_{name}", "site", p.unit, -p.low, p.high - p.low, p.physical_low, p.physical_high))
     return tuple(table)
 
 
@@ -122,18 +124,23 @@ _SCALE = np.array([entry.scale for entry in OBSERVATION])
 _AGE = slice(OBSERVATION_NAMES.index("conifer_seedling"), OBSERVATION_NAMES.index("deciduous_old") + 1)
 _PENALTIES = slice(OBSERVATION_NAMES.index("biomass_limit_penalty"), OBSERVATION_NAMES.index("density_penalty") + 1)
 _SITE = slice(OBSERVATION_NAMES.index(f"site_{next(iter(sim.SITE_PARAMETERS))}"), len(OBSERVATION))
-_CLIMATE = (
-    "latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c", "growth_start_day", "fall_start_day"
-)  # fmt: skip
+_CLIMATE = ("latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c", "growth_start_day", "fall_start_day")
 _COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
 
 
 #: Entries of the observation that are columns of the annual record, by index.
 _RECORDED = {
-    11: "fire_mortality", 13: "insect_mortality", 15: "drought_index", 17: "biomass_change_kgc_m2",
-    18: "soil_change_kgc_m2", 19: "net_carbon_change_kgc_m2", 20: "mortality_kgc_m2", 21: "litterfall_kgc_m2",
-    22: "harvest_kgc_m2", 23: "hwp_stored_kgc_m2",
-}  # fmt: skip
+    11: "fire_mortality",
+    13: "insect_mortality",
+    15: "drought_index",
+    17: "biomass_change_kgc_m2",
+    18: "soil_change_kgc_m2",
+    19: "net_carbon_change_kgc_m2",
+    20: "mortality_kgc_m2",
+    21: "litterfall_kgc_m2",
+    22: "harvest_kgc_m2",
+    23: "hwp_stored_kgc_m2",
+}
 _RECORDED_ENTRIES, _RECORDED_COLUMNS = np.array([(i, _COLUMN[name]) for i, name in _RECORDED.items()]).T
 
 
@@ -308,10 +315,19 @@ def thaw_reward(cooling: np.ndarray, warming: np.ndarray, reward: Reward, formul
 
 #: Columns that the environment adds to the annual record.
 REWARD_COLUMNS = (
-    "carbon_change", "stock_bonus", "product_bonus", "components_clipped", "biomass_limit_penalty",
-    "soil_limit_penalty", "density_penalty", "ineffective_penalty", "carbon_clipped", "thaw_clipped", "carbon_reward",
+    "carbon_change",
+    "stock_bonus",
+    "product_bonus",
+    "components_clipped",
+    "biomass_limit_penalty",
+    "soil_limit_penalty",
+    "density_penalty",
+    "ineffective_penalty",
+    "carbon_clipped",
+    "thaw_clipped",
+    "carbon_reward",
     "thaw_reward",
-)  # fmt: skip
+)
 
 
 def rewards_of_year(record: np.ndarray, actions: np.ndarray, reward: Reward, formulation: str) -> dict[str, np.ndarray]:
@@ -404,11 +420,28 @@ class _Episodes:
     """`number` episodes side by side. Arguments are those of `BorealEnv`, checked here."""
 
     def __init__(
-        self, number, *, mode="generalist", years=DEFAULT_YEARS, time_step_minutes=30, backend="numba",
-        thaw_formulation="asymmetric", fixed_preference=None, site_seed=None, parameter_overrides=None,
-        initial_ranges=None, hwp_half_life_years=None, harvest_min_class="young", reward=None, balanced=False,
-        objectives=PAPER_OBJECTIVES, mechanisms=None, constants=None, observation_groups=None, record_years=False,
-    ):  # fmt: skip
+        self,
+        number,
+        *,
+        mode="generalist",
+        years=DEFAULT_YEARS,
+        time_step_minutes=30,
+        backend="numba",
+        thaw_formulation="asymmetric",
+        fixed_preference=None,
+        site_seed=None,
+        parameter_overrides=None,
+        initial_ranges=None,
+        hwp_half_life_years=None,
+        harvest_min_class="young",
+        reward=None,
+        balanced=False,
+        objectives=PAPER_OBJECTIVES,
+        mechanisms=None,
+        constants=None,
+        observation_groups=None,
+        record_years=False,
+    ):
         _check_choice("mode", mode, MODES)
         _check_choice("thaw_formulation", thaw_formulation, THAW_FORMULATIONS)
         if isinstance(years, bool) or not isinstance(years, (int, np.integer)) or not 1 <= years <= 1000:
@@ -438,9 +471,14 @@ class _Episodes:
         self.reward_space = Box(*np.array(limits, dtype=np.float32).T, dtype=np.float32)
         self.record_years = bool(record_years)
         self.stands = sim.Stands(
-            number, time_step_minutes=time_step_minutes, backend=backend, constants=constants, mechanisms=mechanisms,
-            hwp_half_life_years=hwp_half_life_years, harvest_min_class=harvest_min_class,
-        )  # fmt: skip
+            number,
+            time_step_minutes=time_step_minutes,
+            backend=backend,
+            constants=constants,
+            mechanisms=mechanisms,
+            hwp_half_life_years=hwp_half_life_years,
+            harvest_min_class=harvest_min_class,
+        )
         if isinstance(observation_groups, str) or not np.iterable(observation_groups or ()):
             raise ValueError(f"observation_groups: a sequence of names is allowed, got {observation_groups!r}")
         groups = OBSERVATION_GROUPS if observation_groups is None else tuple(observation_groups)
@@ -597,8 +635,9 @@ class _Episodes:
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
-        there, here = ((kind, *history.shape) for kind, history in
-                       ((state["mode"], state["history"]), (self.mode, self.history)))  # fmt: skip
+        there, here = (
+            (kind, *history.shape) for kind, history in ((state["mode"], state["history"]), (self.mode, self.history))
+        )
         if there != here:
             raise ValueError(f"state of (mode, episodes, years, columns of the record) {there} given to {here}")
         self.stands.set_state(state["stands"])

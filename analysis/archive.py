@@ -52,8 +52,12 @@ def write_compressed(path: Path, table: pd.DataFrame) -> None:
 def folder_of(config: dict, archive_dir: Path) -> Path:
     """Where a run is archived: as `runs/` has it by default, wherever the run itself lies."""
     arguments, changed = config["arguments"], config["not_default"]
-    name = "-".join([arguments["env_id"].split(":")[-1].replace("/", "-"),
-                     *(f"{name}={runs.as_text(value)}" for name, value in changed.items())])  # fmt: skip
+    name = "-".join(
+        [
+            arguments["env_id"].split(":")[-1].replace("/", "-"),
+            *(f"{name}={runs.as_text(value)}" for name, value in changed.items()),
+        ]
+    )
     return archive_dir / config["script"] / name / f"seed{arguments['seed']}"
 
 

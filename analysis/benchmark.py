@@ -146,8 +146,10 @@ def steps(args: Args, stack: ExitStack) -> list[Measurement]:
     def measure(minutes, stands):
         step = per_step(stands)
         year = 1e-6 * step * DAYS * stands.steps_per_day
-        return {(f"a year of {minutes}-minute steps", "ms per stand"): year,
-                (f"a {minutes}-minute step", "ns per stand"): step}  # fmt: skip
+        return {
+            (f"a year of {minutes}-minute steps", "ms per stand"): year,
+            (f"a {minutes}-minute step", "ns per stand"): step,
+        }
 
     lengths = (30, 60) if args.quick else (30, 5, 10, 15, 60, 120)
     return [partial(measure, m, started(16, threads=1, time_step_minutes=m)) for m in lengths]
@@ -228,8 +230,10 @@ def memory(args: Args, stack: ExitStack) -> list[Measurement]:
 
     def measure():
         workers = [own_memory(process.pid) for process in env.processes]
-        return {("async worker", "MB of its own"): statistics.mean(workers),
-                ("this process", "MB of its own"): own_memory(os.getpid())}  # fmt: skip
+        return {
+            ("async worker", "MB of its own"): statistics.mean(workers),
+            ("this process", "MB of its own"): own_memory(os.getpid()),
+        }
 
     return [measure]
 
@@ -268,17 +272,33 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
 
     def measure(kind, number, groups):
         with tempfile.TemporaryDirectory() as folder:
-            command = [sys.executable, ROOT / "cleanrl_style" / "ppo_curriculum.py", "--vectorization", kind,
-                       "--total-timesteps", steps, "--eval-episodes", 2 if args.quick else 32, "--eval-weights", 0, 1,
-                       "--run-dir", folder]  # fmt: skip
+            command = [
+                sys.executable,
+                ROOT / "cleanrl_style" / "ppo_curriculum.py",
+                "--vectorization",
+                kind,
+                "--total-timesteps",
+                steps,
+                "--eval-episodes",
+                2 if args.quick else 32,
+                "--eval-weights",
+                0,
+                1,
+                "--run-dir",
+                folder,
+            ]
             subprocess.run([str(word) for word in command], check=True, capture_output=True)
             timing = pd.read_csv(Path(folder) / "timing.csv")
             played = boreal_env.DEFAULT_YEARS * len(pd.read_csv(Path(folder) / "evaluation.csv"))
         took = {phase: 1e3 * total for phase, total in timing.groupby("phase").seconds.sum().items()}
         physics = 1e3 * statistics.median(physics_alone(groups, pool) for _ in range(5)) / number
         environment, rollout, update = (took[phase] / steps for phase in ("environment", "rollout", "update"))
-        step = {"physics": physics, "plumbing": environment - physics, "policy": rollout - environment,
-                "update": update}  # fmt: skip
+        step = {
+            "physics": physics,
+            "plumbing": environment - physics,
+            "policy": rollout - environment,
+            "update": update,
+        }
         year = took["evaluation"] / played
         evaluated = 100 * len(protocol.POLICIES) * len(protocol.EVAL_WEIGHTS) * boreal_env.DEFAULT_YEARS
         whole = (300_000 * sum(step.values()) + evaluated * year) / 60_000.0
@@ -293,9 +313,15 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
 
 
 SECTIONS = {
-    "episode": episode, "stands": stands, "steps": steps, "threads": threads, "environment": environment,
-    "memory": memory, "start": start_up, "training": training,
-}  # fmt: skip
+    "episode": episode,
+    "stands": stands,
+    "steps": steps,
+    "threads": threads,
+    "environment": environment,
+    "memory": memory,
+    "start": start_up,
+    "training": training,
+}
 FORKING = ("memory", "environment")  # have worker processes, which have to be there before the first thread
 
 # ------------------------------------------------------------------------------------------------ what is reported
@@ -322,8 +348,19 @@ def run(args: Args) -> pd.DataFrame:
         base = first.setdefault((name, unit), values)
         ratio = statistics.median(value / other for value, other in zip(values, base, strict=True))
         theirs = "{low:g}-{high:g} {unit}".format(**paper.loc[PAPER[what]]) if what in PAPER else ""
-        rows.append((name, what, unit, statistics.median(values), min(values), max(values),
-                     np.nan if unit.startswith("%") else ratio, len(values), theirs))  # fmt: skip
+        rows.append(
+            (
+                name,
+                what,
+                unit,
+                statistics.median(values),
+                min(values),
+                max(values),
+                np.nan if unit.startswith("%") else ratio,
+                len(values),
+                theirs,
+            )
+        )
     return pd.DataFrame(rows, columns=COLUMNS)
 
 

@@ -126,8 +126,13 @@ def explanation(claim: Claim, found: Finding) -> list[str]:
 
 def section(number: int, claim: Claim, found: Finding) -> str:
     """A claim as Markdown."""
-    head = [f'<a id="claim-{number}"></a>', "", f"### {number}. {claim.statement}", "",
-            f"{claim.where}. **{found.verdict[0].upper()}{found.verdict[1:]}.**"]  # fmt: skip
+    head = [
+        f'<a id="claim-{number}"></a>',
+        "",
+        f"### {number}. {claim.statement}",
+        "",
+        f"{claim.where}. **{found.verdict[0].upper()}{found.verdict[1:]}.**",
+    ]
     if found.verdict == NO_RUNS:
         return "\n".join([*head, "", f"No runs yet: `{claim.command}` ({found.rule} is lacking)", ""])
     source = f"`{claim.command}`" if claim.command else "From the paper and this project's tables alone."
@@ -137,8 +142,12 @@ def section(number: int, claim: Claim, found: Finding) -> str:
 def contents(themes: dict[str, dict[int, str]], controls: int) -> str:
     """Claims by verdict, then by theme, as tables; themes : title -> number of the claim -> verdict."""
     verdicts = {number: verdict for theme in themes.values() for number, verdict in theme.items()}
-    lines = [f"{len(verdicts)} claims, {controls} of them controls of ours that the paper does not speak of (they say "
-             "so):", "", "| verdict | claims | | that is |", "|---|---|---|---|"]
+    lines = [
+        f"{len(verdicts)} claims, {controls} of them controls of ours that the paper does not speak of (they say so):",
+        "",
+        "| verdict | claims | | that is |",
+        "|---|---|---|---|",
+    ]
     for verdict in VERDICTS:
         of_it = [number for number in verdicts if verdicts[number] == verdict]
         links = " ".join(f"[{number}](#claim-{number})" for number in of_it)
@@ -158,8 +167,11 @@ def progress(results: Results) -> str:
         jobs = [job for job in results.jobs if job.experiment == name]
         planned = [job for job in jobs if not job.is_study]
         there = len(planned) - sum(job.experiment == name for job in results.missing)
-        studies = [f"`{job.script}`{'' if results.study(job.script) is not None else ' (not yet)'}"
-                   for job in jobs if job.is_study]  # fmt: skip
+        studies = [
+            f"`{job.script}`{'' if results.study(job.script) is not None else ' (not yet)'}"
+            for job in jobs
+            if job.is_study
+        ]
         lines.append(f"| `{name}` | {there} | {len(planned)} | {', '.join(studies)} | {what} |")
     return "\n".join(lines)
 

@@ -1,6 +1,6 @@
 """Writes docs/environment.md from the code: the manual of `BorealEnv`, the observation's table, the reward's constants.
 
-    python analysis/document_environment.py [--path docs/environment.md]
+python analysis/document_environment.py [--path docs/environment.md]
 """
 
 import inspect
@@ -17,11 +17,17 @@ from boreal_env import OBSERVATION, BorealEnv, BorealVectorEnv, Objective, Obser
 FINAL_INFO = {
     "carbon_return": ("1", "sum of the carbon rewards"),
     "thaw_return": ("1", "sum of the thaw rewards; `<name>_return` of each objective of your own"),
-    "site_seed": ("", "the site is `sim.sample_site(site_seed)` before `parameter_overrides` and the option `site`; "
-                      "in site-specific mode without temperature noise, and -1, the middle of every range, if no "
-                      "`site_seed` is given"),
-    "episode_seed": ("", "of the start, the weather and the dice, as in `sim.simulate(seed=)`; in site-specific mode "
-                         "the `site_seed`, 0 without one"),
+    "site_seed": (
+        "",
+        "the site is `sim.sample_site(site_seed)` before `parameter_overrides` and the option `site`; "
+        "in site-specific mode without temperature noise, and -1, the middle of every range, if no "
+        "`site_seed` is given",
+    ),
+    "episode_seed": (
+        "",
+        "of the start, the weather and the dice, as in `sim.simulate(seed=)`; in site-specific mode "
+        "the `site_seed`, 0 without one",
+    ),
     "preference": ("1", "weight of carbon that was observed"),
     "final_density": ("stems ha-1", "at the end of the last year"),
     "mean_density": ("stems ha-1", "mean of the years' ends"),
@@ -30,9 +36,12 @@ FINAL_INFO = {
     "growing_season_days": ("day yr-1", "days with a mean above 5 degC, mean of the years"),
     "latent_heat_mj_m2": ("MJ m-2 yr-1", "latent heat to the air, mean of the years"),
     "ground_shortwave_mj_m2": ("MJ m-2 yr-1", "shortwave absorbed by ground and snow, mean of the years"),
-    "years": ("", "with `record_years`: dict of `year` (from 1) and the columns `boreal_env.HISTORY_NAMES`, each with "
-                  "one value a year; units in `sim.state.RECORD`"),
-}  # fmt: skip
+    "years": (
+        "",
+        "with `record_years`: dict of `year` (from 1) and the columns `boreal_env.HISTORY_NAMES`, each with "
+        "one value a year; units in `sim.state.RECORD`",
+    ),
+}
 
 
 def page() -> str:
@@ -98,8 +107,14 @@ env = gym.make("boreal-generalist-v0", objectives=("carbon", "thaw", boreal_env.
 def observation_row(numbered: tuple[int, Observed]) -> tuple[str, ...]:
     """Cells of an entry of the observation."""
     index, entry = numbered
-    return (str(index), f"`{entry.name}`", entry.unit, normalisation(entry), f"{entry.low:g} .. {entry.high:g}",
-            entry.group)  # fmt: skip
+    return (
+        str(index),
+        f"`{entry.name}`",
+        entry.unit,
+        normalisation(entry),
+        f"{entry.low:g} .. {entry.high:g}",
+        entry.group,
+    )
 
 
 def normalisation(entry: Observed) -> str:

@@ -19,8 +19,11 @@ from analysis.results import METHODS, TITLES, Results
 from analysis.tables import distance_to_best, main_results, single_sites
 from analysis.tables.common import GENERALIST, over_seeds
 
-PAGES = ("README.md", "docs/learning.md",
-         *(f"docs/algorithms/{name}.md" for name in (*experiments.TRAINED, "heuristics")))  # fmt: skip
+PAGES = (
+    "README.md",
+    "docs/learning.md",
+    *(f"docs/algorithms/{name}.md" for name in (*experiments.TRAINED, "heuristics")),
+)
 SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
 PLANS = {"dense_conifer": "100 conifers a year", "best_constant_mix": "best constant plan of each weight"}
 ENDS = (0.0, 1.0)  # weights
@@ -45,8 +48,11 @@ class Args:
 def numbers(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
     """What a row shows of one run; a weight that it was not evaluated at is not a number."""
     front = metrics.mean_returns(evaluation)
-    row = {f"{objective}_{weight:g}": front[f"{objective}_return"].get(weight, np.nan)
-           for objective in ("carbon", "thaw") for weight in ENDS}  # fmt: skip
+    row = {
+        f"{objective}_{weight:g}": front[f"{objective}_return"].get(weight, np.nan)
+        for objective in ("carbon", "thaw")
+        for weight in ENDS
+    }
     row |= main_results.front_metrics(evaluation)
     return row if gains is None else row | main_results.front_metrics(gains, "gain_")
 
@@ -77,8 +83,11 @@ def flags(setting: str) -> str:
 def rows_of(results: Results, script: str, environment: str | None = None) -> list[tuple]:
     """`line`'s arguments, the title being the flags, for a script's rows that have runs, the default first."""
     published = main_results.paper_rows().paper_scalarized
-    found = [(key, [(one.evaluation, one.gains) for one in replicates]) for key, replicates in results.rows.items()
-             if key[0] == script and replicates and environment in (None, key[1])]  # fmt: skip
+    found = [
+        (key, [(one.evaluation, one.gains) for one in replicates])
+        for key, replicates in results.rows.items()
+        if key[0] == script and replicates and environment in (None, key[1])
+    ]
     titled = []
     for (_, env_id, setting), evaluations in found:
         parts = [flags(setting), "" if env_id in (GENERALIST, environment) else f"`{env_id}`"]
@@ -96,8 +105,11 @@ def named(script: str, rows: list) -> list:
 def plans(results: Results) -> list[tuple[str, list]]:
     """Rows of the constant plans of the generalist environment, if their study is there."""
     found = main_results.constant_plans(results)
-    return [(title, found[name, GENERALIST, "default"]) for name, title in PLANS.items()
-            if found[name, GENERALIST, "default"]]  # fmt: skip
+    return [
+        (title, found[name, GENERALIST, "default"])
+        for name, title in PLANS.items()
+        if found[name, GENERALIST, "default"]
+    ]
 
 
 def distances(results: Results) -> str:
@@ -106,8 +118,13 @@ def distances(results: Results) -> str:
     if not table.seeds.any():
         return "Not played yet.\n"
     shares = [f"share_{weight:g}" for weight in experiments.WEIGHTS] + ["hypervolume"]
-    text = "| % of the best known gain at carbon weight | seeds | " + " | ".join(
-        f"{weight:g}" for weight in experiments.WEIGHTS) + " | % of the hypervolume |\n" + "|---" * 8 + "|\n"
+    text = (
+        "| % of the best known gain at carbon weight | seeds | "
+        + " | ".join(f"{weight:g}" for weight in experiments.WEIGHTS)
+        + " | % of the hypervolume |\n"
+        + "|---" * 8
+        + "|\n"
+    )
     for _, row in table[table.sites.str.endswith(distance_to_best.ALL)].iterrows():
         trained = row.method in experiments.TRAINED
         words = [TITLES.get(row.method, row.method), *((flags(row.setting), row.policy) if trained else ())]

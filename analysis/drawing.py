@@ -153,9 +153,7 @@ def _mirrored(right):
 def _ellipse(x, y, width, height, lobes=0.0):
     angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     radius = 1.0 + lobes * np.cos(6.0 * angle + 0.4)
-    return np.column_stack(
-        [x + 0.5 * width * radius * np.cos(angle), y + 0.5 * height * radius * np.sin(angle)]
-    )
+    return np.column_stack([x + 0.5 * width * radius * np.cos(angle), y + 0.5 * height * radius * np.sin(angle)])
 
 
 def _shape(*parts):
@@ -164,14 +162,15 @@ def _shape(*parts):
     for polygon, (vertices, _) in zip(polygons, parts, strict=True):
         polygon[:] = vertices[-1]
         polygon[: len(vertices)] = vertices
-    return polygons, np.array(
-        [[int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)] for _, colour in parts]
-    )
+    return polygons, np.array([[int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)] for _, colour in parts])
 
 
 _TIERS = [(0.0, 1.0), (0.2, 0.72), (0.1, 0.73), (0.34, 0.46), (0.2, 0.475), (0.5, 0.12)]
-_SNOW = [[(0.0, 1.0), (-0.2, 0.72), (-0.06, 0.79)], [(-0.1, 0.73), (-0.34, 0.46), (-0.14, 0.56)],
-         [(-0.2, 0.475), (-0.5, 0.12), (-0.24, 0.29)]]  # fmt: skip
+_SNOW = [
+    [(0.0, 1.0), (-0.2, 0.72), (-0.06, 0.79)],
+    [(-0.1, 0.73), (-0.34, 0.46), (-0.14, 0.56)],
+    [(-0.2, 0.475), (-0.5, 0.12), (-0.24, 0.29)],
+]
 _SHADOW = (_ellipse(0.12, 0.0, 0.9, 0.05), "#bccbd8")
 
 #: Shapes of unit height and crown width, standing at (0, 0).
@@ -217,9 +216,7 @@ def sizes(view: View, species: str) -> np.ndarray:
     trees = min(int(np.ceil(stems.sum() / STEMS_PER_TREE - 0.5)), MOST_TREES)
     rank = (np.arange(trees) + 0.5) / max(trees, 1) * stems.sum()
     age = AGES - 1 - np.searchsorted(np.cumsum(stems), rank)
-    height = (1.0 - np.exp(-p[f"height_rate_{species}"] * age)) ** p[f"height_shape_{species}"] * TALLEST_M[
-        species
-    ]
+    height = (1.0 - np.exp(-p[f"height_rate_{species}"] * age)) ** p[f"height_shape_{species}"] * TALLEST_M[species]
     factors = [p[f"crown_{species}_{name}"] for name in ("seedling", "sapling", "young", "mature", "old")]
     crown = p[f"crown_area_{species}_m2"] * np.interp(age, [0, 3, 13, 30, 70, 101], [0.0, *factors])
     height = np.maximum(height, SMALLEST_TREE_M)
@@ -260,29 +257,19 @@ def draw_scene(ax, view: View) -> None:
     ax.axis("off")
     fire = view.last("fire_mortality") > 0.0
     snowy = view.state["swe"] >= SNOWY_MM
-    top, bottom = (
-        ((0.66, 0.60, 0.56), (0.93, 0.72, 0.50)) if fire else ((0.55, 0.72, 0.87), (0.95, 0.93, 0.88))
-    )
+    top, bottom = ((0.66, 0.60, 0.56), (0.93, 0.72, 0.50)) if fire else ((0.55, 0.72, 0.87), (0.95, 0.93, 0.88))
     share = np.linspace(0.0, 1.0, 64)[:, None, None]
     sky = (1.0 - share) * np.array(top) + share * np.array(bottom)
-    ax.imshow(
-        sky, extent=(0.0, PLOT_M, CAMERA_HEIGHT_M, SCENE_HEIGHT_M), aspect="auto", interpolation="bilinear"
-    )
+    ax.imshow(sky, extent=(0.0, PLOT_M, CAMERA_HEIGHT_M, SCENE_HEIGHT_M), aspect="auto", interpolation="bilinear")
 
     generator = np.random.default_rng(view.seed)
     x = np.linspace(0.0, PLOT_M, 60)
     haze = np.array(bottom)
     for height, colour, waves in ((2.4, "#a9bac8", 0.23), (1.1, "#8fa5b1", 0.41)):
         phase = generator.random(2) * 2.0 * np.pi
-        ridge = (
-            0.6
-            * height
-            * (1.0 + 0.5 * np.sin(waves * x + phase[0]) + 0.3 * np.sin(2.7 * waves * x + phase[1]))
-        )
+        ridge = 0.6 * height * (1.0 + 0.5 * np.sin(waves * x + phase[0]) + 0.3 * np.sin(2.7 * waves * x + phase[1]))
         ax.fill_between(x, CAMERA_HEIGHT_M, CAMERA_HEIGHT_M + ridge, color=colour, linewidth=0)
-    near, far = (
-        ((0.90, 0.94, 0.97), (0.98, 0.98, 0.98)) if snowy else ((0.47, 0.49, 0.30), (0.66, 0.67, 0.50))
-    )
+    near, far = ((0.90, 0.94, 0.97), (0.98, 0.98, 0.98)) if snowy else ((0.47, 0.49, 0.30), (0.66, 0.67, 0.50))
     if fire:
         near, far = (0.45, 0.42, 0.40), (0.60, 0.56, 0.53)
     floor = share * np.array(near) + (1.0 - share) * np.array(far)
@@ -325,9 +312,7 @@ def draw_ground(ax, view: View) -> None:
     organic = view.last("organic_layer_m", s["organic_depth"]) * p["moss"]
     mean = p["mean_annual_temperature_c"]
     air = view.last("air_temperature_c", mean)
-    surface = view.last(
-        "surface_soil_temperature_c", temperature(s["surface_heat"], *soil_node(p, "surface"))
-    )
+    surface = view.last("surface_soil_temperature_c", temperature(s["surface_heat"], *soil_node(p, "surface")))
     deep = view.last("deep_soil_temperature_c", temperature(s["deep_heat"], *soil_node(p, "deep")))
     depths = organic + np.array([0.5 * p["surface_soil_depth_m"], p["deep_soil_node_m"], p["boundary_depth_m"]])
     temperatures = np.array([surface, deep, boundary])
@@ -353,13 +338,18 @@ def draw_ground(ax, view: View) -> None:
     ax.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
     points = np.concatenate([[air], temperatures]), np.concatenate([[0.88], height_on_scale(depths)])
     ax.plot(*points, color="white", linewidth=3.2, solid_joinstyle="round")
-    ax.plot(*points, color="#b5361c", linewidth=1.6, marker="o", markersize=4.5, markeredgecolor="white",
-            markeredgewidth=0.7)  # fmt: skip
+    ax.plot(
+        *points,
+        color="#b5361c",
+        linewidth=1.6,
+        marker="o",
+        markersize=4.5,
+        markeredgecolor="white",
+        markeredgewidth=0.7,
+    )
     air_name = "air" if view.year else "air, annual mean"
     for name, x, y in zip((air_name, "surface soil", "deep soil", "boundary"), *points, strict=True):
-        ax.text(
-            x + 0.02 * (high - low), y, f"{name} {x:.1f}", fontsize=SMALL, color=INK, va="center", bbox=LABEL
-        )
+        ax.text(x + 0.02 * (high - low), y, f"{name} {x:.1f}", fontsize=SMALL, color=INK, va="center", bbox=LABEL)
 
     labels = [(f"snow, {swe:.0f} mm of water", "left", -0.25 * max(snow, 0.1))]
     if organic > 0.0:
@@ -400,9 +390,7 @@ def draw_years(figure, view: View) -> None:
 
     now = view.stems.sum(axis=1)
     density = np.concatenate([view.history["density_stems_ha"], now.sum()[None] if not view.year else []])
-    share = np.concatenate(
-        [view.history["conifer_fraction"], [now[0] / max(now.sum(), 1e-9)] if not view.year else []]
-    )
+    share = np.concatenate([view.history["conifer_fraction"], [now[0] / max(now.sum(), 1e-9)] if not view.year else []])
     after = years[-len(density) :]
     _areas(
         stems,
@@ -432,9 +420,7 @@ def draw_years(figure, view: View) -> None:
         )
         _frame(ax, view, f"{name} return {total[-1]:+.2f}", low, high)
     thaw.tick_params(labelbottom=True)
-    thaw.set_xticks(
-        thaw.get_xticks(), [*(f"{year:g}" for year in thaw.get_xticks()[:-1]), f"{view.years} yr"]
-    )
+    thaw.set_xticks(thaw.get_xticks(), [*(f"{year:g}" for year in thaw.get_xticks()[:-1]), f"{view.years} yr"])
 
 
 def _areas(ax, years, layers) -> None:
@@ -446,9 +432,17 @@ def _areas(ax, years, layers) -> None:
             ax.plot([years[0]] * 2, [base[0], base[0] + values[0]], color=colour, linewidth=4)
         base = base + values
     ax.legend(
-        loc="lower right", bbox_to_anchor=(1.02, 0.94), ncols=len(layers), fontsize=SMALL - 0.5,
-        frameon=False, handlelength=0.8, handletextpad=0.3, columnspacing=0.7, borderpad=0.0, labelcolor=INK,
-    )  # fmt: skip
+        loc="lower right",
+        bbox_to_anchor=(1.02, 0.94),
+        ncols=len(layers),
+        fontsize=SMALL - 0.5,
+        frameon=False,
+        handlelength=0.8,
+        handletextpad=0.3,
+        columnspacing=0.7,
+        borderpad=0.0,
+        labelcolor=INK,
+    )
 
 
 def _frame(ax, view: View, title: str, low: float, high: float) -> None:

@@ -10,8 +10,15 @@ ROOT = Path(__file__).parents[1]
 HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 METHODS = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum")  # conditioned on the preference
 TRAINED = (*METHODS, "eupg_fixed_lambda")
-STUDIES = ("constant_plans", "training_gains", "mechanism_pairs", "site_warming", "signal_to_noise", "gradient_noise",
-           "distance_to_best")  # fmt: skip
+STUDIES = (
+    "constant_plans",
+    "training_gains",
+    "mechanism_pairs",
+    "site_warming",
+    "signal_to_noise",
+    "gradient_noise",
+    "distance_to_best",
+)
 READING = ("training_gains", "site_warming", "distance_to_best")  # studies that read the runs before them
 WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SITE_SEEDS = (1, 2, 3, 4, 5)
@@ -109,8 +116,11 @@ class Job:
         return (
             config["script"] == self.script
             and arguments["env_id"] == self.env_id
-            and all(arguments.get(name) == (list(value) if isinstance(value, tuple) else value)
-                    for name, value in self.flags.items() if name not in OUTPUT)
+            and all(
+                arguments.get(name) == (list(value) if isinstance(value, tuple) else value)
+                for name, value in self.flags.items()
+                if name not in OUTPUT
+            )
             and changed <= {*self.flags, "env_id", "mode"}
         )
 
@@ -137,8 +147,11 @@ def main_table(seeds) -> list[Job]:
 
 def fixed_weights(seeds) -> list[Job]:
     """EUPG trained for one weight, on all sites."""
-    return [trained("fixed", "eupg_fixed_lambda", seed, preference=weight)
-            for seed in seeds_of(5, seeds) for weight in WEIGHTS]  # fmt: skip
+    return [
+        trained("fixed", "eupg_fixed_lambda", seed, preference=weight)
+        for seed in seeds_of(5, seeds)
+        for weight in WEIGHTS
+    ]
 
 
 def single_sites(seeds) -> list[Job]:
@@ -155,8 +168,11 @@ def single_sites(seeds) -> list[Job]:
         jobs.append(Job("site", "zero_change", site))
         jobs += [trained("site", "eupg_fixed_lambda", seed, preference=weight, **site) for weight in WEIGHTS]
     others = ((0.0, {"baseline": "others"}), (1.0, {"baseline": "others"}), (0.0, {"utility": "future"}))
-    return jobs + [trained("site", "eupg_fixed_lambda", seed, preference=weight, **flags, **site)
-                   for seed, site in sites.items() for weight, flags in others]  # fmt: skip
+    return jobs + [
+        trained("site", "eupg_fixed_lambda", seed, preference=weight, **flags, **site)
+        for seed, site in sites.items()
+        for weight, flags in others
+    ]
 
 
 def thaw_formulations(seeds) -> list[Job]:
@@ -164,8 +180,9 @@ def thaw_formulations(seeds) -> list[Job]:
     formulations = ("contrast", "raw_degree_days")
     return [Job("thaw", "zero_change", {"thaw_formulation": formulation}) for formulation in formulations] + [
         trained("thaw", "ppo_gated", seed, thaw_formulation=formulation)
-        for seed in seeds_of(5, seeds) for formulation in formulations
-    ]  # fmt: skip
+        for seed in seeds_of(5, seeds)
+        for formulation in formulations
+    ]
 
 
 def balanced(seeds) -> list[Job]:
@@ -207,8 +224,11 @@ def variants(seeds) -> list[Job]:
         ("eupg_var_lambda", {"num_envs": 1}),
     )
     judged = ({"ent_coef": 0.0, "per_objective_advantages": True}, {"hide_site": True})  # by analysis/paper_claims
-    return [trained("variants", script, seed, **change)
-            for script, change in changes for seed in seeds_of(5 if change in judged else 3, seeds)]  # fmt: skip
+    return [
+        trained("variants", script, seed, **change)
+        for script, change in changes
+        for seed in seeds_of(5 if change in judged else 3, seeds)
+    ]
 
 
 def mechanisms(seeds) -> list[Job]:
@@ -222,8 +242,17 @@ def front_sites(seeds) -> list[Job]:
     for seed in seeds_of(len(FRONT_SITES), seeds):
         site = {"site_seed": FRONT_SITES[seed - 1]}
         jobs.append(Job("single", "zero_change", site))
-        jobs.append(trained("single", "ppo_gated", seed, total_timesteps=SITE_SPECIFIC_STEPS, ent_coef=0.0,
-                            per_objective_advantages=True, **site))
+        jobs.append(
+            trained(
+                "single",
+                "ppo_gated",
+                seed,
+                total_timesteps=SITE_SPECIFIC_STEPS,
+                ent_coef=0.0,
+                per_objective_advantages=True,
+                **site,
+            )
+        )
     return jobs
 
 
@@ -232,9 +261,18 @@ def difficulty(seeds) -> list[Job]:
     return [Job("difficulty", script) for script in ("signal_to_noise", "gradient_noise", "distance_to_best")]
 
 
-JOBS_OF = {"main": main_table, "fixed": fixed_weights, "site": single_sites, "thaw": thaw_formulations,
-           "balanced": balanced, "controls": controls, "variants": variants, "mechanisms": mechanisms,
-           "single": front_sites, "difficulty": difficulty}  # fmt: skip
+JOBS_OF = {
+    "main": main_table,
+    "fixed": fixed_weights,
+    "site": single_sites,
+    "thaw": thaw_formulations,
+    "balanced": balanced,
+    "controls": controls,
+    "variants": variants,
+    "mechanisms": mechanisms,
+    "single": front_sites,
+    "difficulty": difficulty,
+}
 
 
 def jobs(only=tuple(EXPERIMENTS), seeds: list[int] | None = None) -> list[Job]:

@@ -31,8 +31,19 @@ from analysis.figures.common import STYLE, save
 from analysis.make_tables import name_of
 from analysis.results import Results
 
-FIGURES = (learning_curves, learning_asymmetry, algorithm_comparison, strategies, site_influence, trade_off_coverage,
-           training_dynamics, performance_panel, individual_objectives, demographics, learning_difficulty)  # fmt: skip
+FIGURES = (
+    learning_curves,
+    learning_asymmetry,
+    algorithm_comparison,
+    strategies,
+    site_influence,
+    trade_off_coverage,
+    training_dynamics,
+    performance_panel,
+    individual_objectives,
+    demographics,
+    learning_difficulty,
+)
 
 
 @dataclass
@@ -61,8 +72,10 @@ def main(args: Args) -> None:
     results = Results.load(args.quick, args.runs_dir)
     if not any(results.rows.values()):
         where = ", ".join(map(str, results.roots))
-        sys.exit(f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, the first is\n"
-                 f"  {results.jobs[0].command}")  # fmt: skip
+        sys.exit(
+            f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, the first is\n"
+            f"  {results.jobs[0].command}"
+        )
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)
     folder = args.figures_dir or Path("results/quick/figures" if args.quick else "results/figures")

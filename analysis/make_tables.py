@@ -30,9 +30,21 @@ from analysis.tables import (
 )
 from analysis.tables.common import readable, write_table
 
-TABLES = (main_results, thaw_formulations, growing_season_correlations, learned_strategies, warming_flux,
-          physical_conflicts, curriculum_selection, detailed_objectives, lambda_violations, runtime,
-          learning_difficulty, single_sites, distance_to_best)  # fmt: skip
+TABLES = (
+    main_results,
+    thaw_formulations,
+    growing_season_correlations,
+    learned_strategies,
+    warming_flux,
+    physical_conflicts,
+    curriculum_selection,
+    detailed_objectives,
+    lambda_violations,
+    runtime,
+    learning_difficulty,
+    single_sites,
+    distance_to_best,
+)
 
 
 @dataclass
@@ -75,8 +87,10 @@ def main(args: Args) -> None:
     if not results.runs:
         where = ", ".join(map(str, results.roots))
         commands = dict.fromkeys(job.command for job in results.missing if job.exists)
-        sys.exit(f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, these the rows:\n"
-                 + "\n".join(f"  {command}" for command in commands))  # fmt: skip
+        sys.exit(
+            f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, these the rows:\n"
+            + "\n".join(f"  {command}" for command in commands)
+        )
     folder = args.tables_dir or Path("results/quick/tables" if args.quick else "results/tables")
     try:
         folder.mkdir(parents=True, exist_ok=True)

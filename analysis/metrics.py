@@ -79,8 +79,10 @@ def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame) -> pd.DataFrame:
     reference = zero_change.drop_duplicates("seed").set_index("seed")[OBJECTIVES]
     missing = sorted(set(evaluation.seed) - set(reference.index))
     if missing:
-        raise ValueError(f"zero change was not evaluated on the episode with seed {missing[0]} "
-                         f"(nor on {len(missing) - 1} others); evaluate both with the same --eval-episodes")
+        raise ValueError(
+            f"zero change was not evaluated on the episode with seed {missing[0]} "
+            f"(nor on {len(missing) - 1} others); evaluate both with the same --eval-episodes"
+        )
     difference = evaluation.copy()
     difference[OBJECTIVES] -= reference.loc[evaluation.seed].to_numpy()
     difference["scalarized_return"] = scalarize(*difference[OBJECTIVES].to_numpy().T, difference.preference)

@@ -24,8 +24,9 @@ import boreal_env
 from analysis import archive, claims, document_results, experiments, make_figures, make_tables, protocol, runs
 from sim.stands import available_cores
 
-Experiment = Literal["main", "fixed", "site", "thaw", "balanced", "controls", "variants", "mechanisms", "single",
-                     "difficulty"]  # fmt: skip
+Experiment = Literal[
+    "main", "fixed", "site", "thaw", "balanced", "controls", "variants", "mechanisms", "single", "difficulty"
+]
 POLL_SECONDS, REPORT_SECONDS = 0.5, 30.0
 STOP_SECONDS = 30.0  # that a job has to end by itself
 LAST_LINES = 8  # of a failed job's output

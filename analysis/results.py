@@ -64,8 +64,7 @@ class Results:
     def __init__(self, roots: tuple[Path, ...], jobs: list[experiments.Job], studies_dir: Path):
         self.roots, self.jobs, self.studies_dir = roots, jobs, studies_dir
         self.runs, self.left_out = runs.read_runs(*roots)
-        self.missing = [job for job in jobs if not job.is_study
-                        and not any(job.made(run.config) for run in self.runs)]  # fmt: skip
+        self.missing = [job for job in jobs if not job.is_study and not any(job.made(run.config) for run in self.runs)]
 
     @staticmethod
     def load(quick: bool, roots: tuple[Path, ...] | None = None) -> "Results":
@@ -85,8 +84,10 @@ class Results:
         for run in self.runs:
             row = rows.setdefault((run.script, run.arguments["env_id"], run.setting), {})
             row.setdefault((run.arguments["seed"], run.arguments["site_seed"]), []).append(run)
-        return {key: [self._replicate(*item) for item in sorted(row.items(), key=str) if self._complete(key, *item)]
-                for key, row in rows.items()}  # fmt: skip
+        return {
+            key: [self._replicate(*item) for item in sorted(row.items(), key=str) if self._complete(key, *item)]
+            for key, row in rows.items()
+        }
 
     def _complete(self, key, replicate, its_runs) -> bool:
         """Whether one agent a weight is there for every weight of the experiment; if not, it is named."""
@@ -95,8 +96,10 @@ class Results:
         if lacking:
             seed, site_seed = replicate
             site = "" if site_seed is None else f", site seed {site_seed}"
-            self.left_out.append(f"{key[0]}, {key[1]}, seed {seed}{site}: partial, without the agents of the weights "
-                                 f"{', '.join(f'{weight:g}' for weight in sorted(lacking))}")  # fmt: skip
+            self.left_out.append(
+                f"{key[0]}, {key[1]}, seed {seed}{site}: partial, without the agents of the weights "
+                f"{', '.join(f'{weight:g}' for weight in sorted(lacking))}"
+            )
         return not lacking
 
     def _replicate(self, _, its_runs) -> Replicate:
@@ -107,16 +110,27 @@ class Results:
     def gains(self, evaluation, env_id, thaw_formulation="asymmetric", site_seed=None) -> pd.DataFrame | None:
         """An evaluation less zero change under the same reward; None if that was not evaluated on its episodes."""
         conditions = {"env_id": env_id, "thaw_formulation": thaw_formulation, "site_seed": site_seed}
-        same = [run.evaluation for run in self.runs if run.script == "zero_change"
-                and all(run.arguments[name] == value for name, value in conditions.items())]  # fmt: skip
+        same = [
+            run.evaluation
+            for run in self.runs
+            if run.script == "zero_change" and all(run.arguments[name] == value for name, value in conditions.items())
+        ]
         longest = max(same, key=len, default=None)
         known = longest is not None and set(evaluation.seed) <= set(longest.seed)
         return metrics.gains(evaluation, longest) if known else None
 
     def of(self, experiment: str, script: str, **flags) -> list[Replicate]:
         """Replicates of an experiment's row: the first of its jobs with these flags says which; none without a job."""
-        job = next((job for job in self.jobs if job.experiment == experiment and job.script == script
-                    and all(job.flags.get(name) == value for name, value in flags.items())), None)  # fmt: skip
+        job = next(
+            (
+                job
+                for job in self.jobs
+                if job.experiment == experiment
+                and job.script == script
+                and all(job.flags.get(name) == value for name, value in flags.items())
+            ),
+            None,
+        )
         return [] if job is None else self.rows[job.row]
 
     def expected(self, key: tuple) -> int:
@@ -130,7 +144,8 @@ class Results:
     def is_trained(self, key: tuple) -> bool:
         """Whether a row is of a script that trains, by its jobs or its runs."""
         return any(job.row == key and job.steps for job in self.jobs) or any(
-            "total_timesteps" in one.runs[0].arguments for one in self.rows[key])  # fmt: skip
+            "total_timesteps" in one.runs[0].arguments for one in self.rows[key]
+        )
 
     def of_main_and_others(self, scripts) -> dict[tuple, list[Replicate]]:
         """Rows of the main experiment's scripts, then those of scripts that no experiment has, such as one's own.
@@ -140,8 +155,11 @@ class Results:
         planned = {job.script for job in self.jobs}
         keys = [self.first_job("main", script).row for script in scripts]
         environment = keys[0][1]
-        keys += [key for key in self.rows if key[0] not in planned and key[1] == environment
-                 and "thaw_formulation" not in key[2]]  # fmt: skip
+        keys += [
+            key
+            for key in self.rows
+            if key[0] not in planned and key[1] == environment and "thaw_formulation" not in key[2]
+        ]
         return {key: self.rows[key] for key in keys}
 
     def first_job(self, experiment: str, script: str) -> experiments.Job:

@@ -113,8 +113,9 @@ def read_run(folder: Path) -> Run:
     weights = [arguments["preference"]] if "preference" in arguments else arguments["eval_weights"]
     expected = len(weights) * arguments["eval_episodes"]
     if len(evaluation) != expected:
-        raise ValueError(f"damaged: evaluation.csv has {len(evaluation)} episodes of the sampled policy, "
-                         f"not {expected}")  # fmt: skip
+        raise ValueError(
+            f"damaged: evaluation.csv has {len(evaluation)} episodes of the sampled policy, not {expected}"
+        )
     if not np.isfinite(evaluation[metrics.OBJECTIVES].to_numpy(dtype=float)).all():
         raise ValueError("damaged: evaluation.csv has returns that are not finite numbers")
     episodes = required_table(folder, "episodes") if "total_timesteps" in arguments else None

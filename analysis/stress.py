@@ -116,9 +116,16 @@ class Outcome:
     def fail(self, kind: str, stand, year: int, what: str) -> None:
         """Note a failure: kind is "balance", "not finite" or "out of range"."""
         self.failures.append(
-            {"batch": self.number, "group": self.group, "time_step_minutes": self.minutes,
-             "kind": kind, "stand": stand, "year": year, "what": what}
-        )  # fmt: skip
+            {
+                "batch": self.number,
+                "group": self.group,
+                "time_step_minutes": self.minutes,
+                "kind": kind,
+                "stand": stand,
+                "year": year,
+                "what": what,
+            }
+        )
 
 
 # ------------------------------------------------------------------------------------------------- what is drawn
@@ -203,9 +210,13 @@ def budgets(before: np.ndarray, after: np.ndarray, record: dict) -> Iterator[tup
     r = record
     carbon, stock = change("conifer_biomass", "deciduous_biomass", "soil_carbon", "products")
     crossed = (
-        r["gpp_kgc_m2"] - r["autotrophic_respiration_kgc_m2"] - r["heterotrophic_respiration_kgc_m2"]
-        - r["fire_loss_kgc_m2"] - r["harvest_emission_kgc_m2"] - r["hwp_decay_kgc_m2"]
-    )  # fmt: skip
+        r["gpp_kgc_m2"]
+        - r["autotrophic_respiration_kgc_m2"]
+        - r["heterotrophic_respiration_kgc_m2"]
+        - r["fire_loss_kgc_m2"]
+        - r["harvest_emission_kgc_m2"]
+        - r["hwp_decay_kgc_m2"]
+    )
     yield "carbon_of_the_year_kgc_m2", np.abs(carbon - crossed) / (1.0 + stock)
 
     water, stock = change("swe", "canopy_snow", "canopy_rain", "soil_water")
@@ -230,8 +241,16 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
     rounded = 1.0 + 1e-12
 
     # Stocks and what else lasts: not below zero, not beyond what holds it.
-    for name in ("conifer_biomass", "deciduous_biomass", "soil_carbon", "products", "organic_depth", "swe",
-                 "canopy_snow", "drought"):  # fmt: skip
+    for name in (
+        "conifer_biomass",
+        "deciduous_biomass",
+        "soil_carbon",
+        "products",
+        "organic_depth",
+        "swe",
+        "canopy_snow",
+        "drought",
+    ):
         yield name, s[name], 0.0, np.inf
     yield "stems by age", stems, 0.0, np.inf
     yield "soil_water", s["soil_water"], 0.0, p["max_water_content_mm"] * rounded
@@ -247,10 +266,24 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         yield name, r[name], 0.0, DAYS
     for name in ("summer_albedo", "winter_albedo"):
         yield name, r[name], 0.0, 1.0
-    for name in ("litterfall_kgc_m2", "mortality_kgc_m2", "fire_mortality_kgc_m2", "fire_loss_kgc_m2",
-                 "harvest_kgc_m2", "harvest_emission_kgc_m2", "hwp_stored_kgc_m2", "hwp_decay_kgc_m2",
-                 "precipitation_mm", "canopy_sublimation_mm", "boundary_warming_mj_m2", "boundary_cooling_mj_m2",
-                 "planted_stems_ha", "thinned_stems_ha", "drought_index", "peak_swe_mm"):  # fmt: skip
+    for name in (
+        "litterfall_kgc_m2",
+        "mortality_kgc_m2",
+        "fire_mortality_kgc_m2",
+        "fire_loss_kgc_m2",
+        "harvest_kgc_m2",
+        "harvest_emission_kgc_m2",
+        "hwp_stored_kgc_m2",
+        "hwp_decay_kgc_m2",
+        "precipitation_mm",
+        "canopy_sublimation_mm",
+        "boundary_warming_mj_m2",
+        "boundary_cooling_mj_m2",
+        "planted_stems_ha",
+        "thinned_stems_ha",
+        "drought_index",
+        "peak_swe_mm",
+    ):
         yield name, r[name], 0.0, np.inf
     yield "snowfall_mm", r["snowfall_mm"], 0.0, r["precipitation_mm"] * rounded
     yield "transpiration_mm", r["transpiration_mm"], 1.0 - rounded, np.inf
@@ -261,9 +294,18 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
     yield "density_after_action", r["density_after_action"], least / rounded, largest * rounded
 
     # The days.
-    for name in ("swe_mm", "canopy_snow_mm", "lai", "organic_layer_m", "precipitation_mm", "shortwave_mj_m2",
-                 "gpp_kgc_m2", "autotrophic_respiration_kgc_m2", "heterotrophic_respiration_kgc_m2",
-                 "runoff_mm"):  # fmt: skip
+    for name in (
+        "swe_mm",
+        "canopy_snow_mm",
+        "lai",
+        "organic_layer_m",
+        "precipitation_mm",
+        "shortwave_mj_m2",
+        "gpp_kgc_m2",
+        "autotrophic_respiration_kgc_m2",
+        "heterotrophic_respiration_kgc_m2",
+        "runoff_mm",
+    ):
         yield f"daily {name}", d[name], 0.0, np.inf
     yield "daily soil_water_mm", d["soil_water_mm"], 0.0, p["max_water_content_mm"][:, None] * rounded
     yield "daily albedo", d["albedo"], 0.0, 1.0
@@ -400,8 +442,10 @@ def main(args: Args) -> None:
         outcome = run_batch(args.seed, args.batch)
         for failure in outcome.failures:
             print(*(f"{name}={value}" for name, value in failure.items()), sep=", ")
-        print(f"batch {args.batch} ({outcome.group}, {outcome.minutes} min): {outcome.stand_years} stand-years, "
-              f"{len(outcome.failures)} failures")  # fmt: skip
+        print(
+            f"batch {args.batch} ({outcome.group}, {outcome.minutes} min): {outcome.stand_years} stand-years, "
+            f"{len(outcome.failures)} failures"
+        )
         sys.exit(1 if outcome.failures else 0)
 
     try:
@@ -428,13 +472,17 @@ def main(args: Args) -> None:
     write(args.output_dir, "failures.csv", pd.DataFrame(failures, columns=columns))
     total = sum(outcome.stand_years for outcome in outcomes)
     print(report(table))
-    print(f"{total:,} stand-years in {len(outcomes)} batches, {seconds:.0f} s, {total / seconds:,.0f} a second with "
-          f"{args.threads} threads; spin-up comes on top. Tables are in {args.output_dir}")  # fmt: skip
+    print(
+        f"{total:,} stand-years in {len(outcomes)} batches, {seconds:.0f} s, {total / seconds:,.0f} a second with "
+        f"{args.threads} threads; spin-up comes on top. Tables are in {args.output_dir}"
+    )
     if failures:
         first = {failure["batch"]: failure for failure in reversed(failures)}
         for number, failure in sorted(first.items())[:10]:
-            print(f"{failure['group']}: {failure['what'][:100]}; replay it with\n"
-                  f"    python analysis/stress.py --seed {args.seed} --batch {number}")  # fmt: skip
+            print(
+                f"{failure['group']}: {failure['what'][:100]}; replay it with\n"
+                f"    python analysis/stress.py --seed {args.seed} --batch {number}"
+            )
         sys.exit(f"{len(failures)} failures in {len(first)} batches")
 
 

@@ -60,10 +60,10 @@ def main(script: str, policy) -> None:
 
 def repeat(table: pd.DataFrame, weights) -> pd.DataFrame:
     """The table once for every policy and weight, scalarised anew."""
-    copies = [table.assign(policy=policy, preference=weight)
-              for policy in protocol.POLICIES for weight in weights]
+    copies = [table.assign(policy=policy, preference=weight) for policy in protocol.POLICIES for weight in weights]
     repeated = pd.concat(copies, ignore_index=True)
     if "scalarized_return" in repeated:
-        repeated["scalarized_return"] = protocol.scalarize(repeated.carbon_return, repeated.thaw_return,
-                                                           repeated.preference)
+        repeated["scalarized_return"] = protocol.scalarize(
+            repeated.carbon_return, repeated.thaw_return, repeated.preference
+        )
     return repeated

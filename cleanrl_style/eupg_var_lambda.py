@@ -133,13 +133,22 @@ if __name__ == "__main__":
     args = protocol.parse(Args)
     env_kwargs = protocol.prepare(args)
     episode_columns = protocol.EPISODE_COLUMNS
-    update_columns = ("iteration", "global_step", "policy_loss", "entropy", "gradient_norm", "utility_mean",
-                      "utility_std")
+    update_columns = (
+        "iteration",
+        "global_step",
+        "policy_loss",
+        "entropy",
+        "gradient_norm",
+        "utility_mean",
+        "utility_std",
+    )
     if args.baseline == "others" and args.num_envs == 1:
         protocol.fail("--baseline others is the mean of a batch's other episodes: --num-envs 1 has none")
     if args.env_id in protocol.MODES and args.total_timesteps < boreal_env.DEFAULT_YEARS * args.num_envs:
-        protocol.fail(f"--total-timesteps {args.total_timesteps} has no room for a batch, an episode of each "
-                      f"environment: {boreal_env.DEFAULT_YEARS * args.num_envs} steps")
+        protocol.fail(
+            f"--total-timesteps {args.total_timesteps} has no room for a batch, an episode of each "
+            f"environment: {boreal_env.DEFAULT_YEARS * args.num_envs} steps"
+        )
 
     with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
         # TRY NOT TO MODIFY: seeding
@@ -199,20 +208,31 @@ if __name__ == "__main__":
                 episode_returns += reward
 
             if not next_done.all():
-                protocol.fail(f"--env-id {args.env_id}: EUPG needs episodes of one length, and one ended at step "
-                              f"{len(rewards)} before the others")
+                protocol.fail(
+                    f"--env-id {args.env_id}: EUPG needs episodes of one length, and one ended at step "
+                    f"{len(rewards)} before the others"
+                )
             if global_step > args.total_timesteps:
-                protocol.fail(f"--total-timesteps {args.total_timesteps} has no room for a batch, an episode of each "
-                              f"environment: {global_step} steps")
+                protocol.fail(
+                    f"--total-timesteps {args.total_timesteps} has no room for a batch, an episode of each "
+                    f"environment: {global_step} steps"
+                )
             for i in range(args.num_envs):
                 episode += 1
                 carbon, thaw = episode_returns[i]
-                run.log("episodes", {
-                    "global_step": global_step, "episode": episode, "env": i, "preference": preferences[i],
-                    "carbon_return": carbon, "thaw_return": thaw,
-                    "scalarized_return": protocol.scalarize(carbon, thaw, preferences[i]),
-                    **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO)),
-                })
+                run.log(
+                    "episodes",
+                    {
+                        "global_step": global_step,
+                        "episode": episode,
+                        "env": i,
+                        "preference": preferences[i],
+                        "carbon_return": carbon,
+                        "thaw_return": thaw,
+                        "scalarized_return": protocol.scalarize(carbon, thaw, preferences[i]),
+                        **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO)),
+                    },
+                )
                 progress.returns.append((carbon, thaw))
             run.time("environment", global_step, env_seconds)
             run.time("rollout", global_step, time.perf_counter() - rollout_start)
@@ -220,27 +240,43 @@ if __name__ == "__main__":
 
             # Optimizing the policy: one step of gradient ascent
             utilities = compute_utilities(np.stack(rewards), preferences, args.gamma, args.utility, args.baseline)
-            loss, entropy = eupg_loss(agent, torch.cat(obs), torch.cat(masks), torch.cat(actions),
-                                      torch.from_numpy(utilities.ravel().astype(np.float32)))
+            loss, entropy = eupg_loss(
+                agent,
+                torch.cat(obs),
+                torch.cat(masks),
+                torch.cat(actions),
+                torch.from_numpy(utilities.ravel().astype(np.float32)),
+            )
             optimizer.zero_grad()
             (loss - args.ent_coef * entropy).backward()
             gradient_norm = nn.utils.clip_grad_norm_(agent.parameters(), math.inf)  # measures, clips nothing
             optimizer.step()
 
             # TRY NOT TO MODIFY: record the update
-            run.log("updates", {
-                "iteration": iteration, "global_step": global_step, "policy_loss": loss.item(),
-                "entropy": entropy.item(), "gradient_norm": gradient_norm.item(),
-                "utility_mean": utilities.mean(), "utility_std": utilities.std(),
-            })
+            run.log(
+                "updates",
+                {
+                    "iteration": iteration,
+                    "global_step": global_step,
+                    "policy_loss": loss.item(),
+                    "entropy": entropy.item(),
+                    "gradient_norm": gradient_norm.item(),
+                    "utility_mean": utilities.mean(),
+                    "utility_std": utilities.std(),
+                },
+            )
             run.time("update", global_step, time.perf_counter() - update_start)
 
             batch_steps = len(rewards) * args.num_envs
             last = global_step + batch_steps > args.total_timesteps
             progress.show(global_step, last)
             state = {
-                "agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
-                "episode": episode, "next_obs": next_obs, "batch_steps": batch_steps,
+                "agent": agent.state_dict(),
+                "optimizer": optimizer.state_dict(),
+                "iteration": iteration,
+                "episode": episode,
+                "next_obs": next_obs,
+                "batch_steps": batch_steps,
             }
             run.save(global_step, last, **state)
 

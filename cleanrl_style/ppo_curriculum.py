@@ -201,6 +201,7 @@ class Curriculum:
 
     On one site, and without the 62 site observations (site-specific mode), the network accepts all episodes.
     """
+
     NUM_SITE_INPUTS = 62
 
     def __init__(self, observation_dim, args):
@@ -231,7 +232,7 @@ class Curriculum:
             return self.coin.random(len(observations))
         if self.accepts_all:
             return np.ones(len(observations))
-        logits = self.logit(observations[:, -self.NUM_SITE_INPUTS:].astype(np.float64))
+        logits = self.logit(observations[:, -self.NUM_SITE_INPUTS :].astype(np.float64))
         return 1 / (1 + np.exp(-(logits - self.mean) / self.std))
 
     def update_threshold(self):
@@ -257,8 +258,17 @@ if __name__ == "__main__":
     args = protocol.parse(Args)
     env_kwargs = protocol.prepare(args)
     episode_columns = protocol.EPISODE_COLUMNS
-    update_columns = ("iteration", "global_step", "policy_loss", "value_loss", "entropy", "old_approx_kl",
-                      "approx_kl", "clip_fraction", "explained_variance")
+    update_columns = (
+        "iteration",
+        "global_step",
+        "policy_loss",
+        "value_loss",
+        "entropy",
+        "old_approx_kl",
+        "approx_kl",
+        "clip_fraction",
+        "explained_variance",
+    )
     # CURRICULUM
     if args.selector == "coin" and args.raw_selector:
         protocol.fail("--raw-selector is for --selector network: a coin has no logit")
@@ -356,9 +366,16 @@ if __name__ == "__main__":
                     episode += 1
                     carbon, thaw = episode_returns[i]
                     scalarized_return = protocol.scalarize(carbon, thaw, preferences[i])
-                    row = {"global_step": global_step, "episode": episode, "env": i, "preference": preferences[i],
-                           "carbon_return": carbon, "thaw_return": thaw, "scalarized_return": scalarized_return,
-                           **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO))}
+                    row = {
+                        "global_step": global_step,
+                        "episode": episode,
+                        "env": i,
+                        "preference": preferences[i],
+                        "carbon_return": carbon,
+                        "thaw_return": thaw,
+                        "scalarized_return": scalarized_return,
+                        **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO)),
+                    }
                     # CURRICULUM: note the episode that ended, choose whether to train on the one that begins
                     row |= {"score": scores[i], "threshold": thresholds[i], "selected": int(selected[i])}
                     curriculum.finished.append((preferences[i], scalarized_return, selected[i]))
@@ -403,9 +420,17 @@ if __name__ == "__main__":
                 np.random.shuffle(b_inds)
                 for minibatch in range(num_minibatches):
                     mb_inds = b_inds[minibatch::num_minibatches]
-                    parts = ppo_losses(agent, b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds],
-                                       b_logprobs[mb_inds], b_advantages[mb_inds], b_returns[mb_inds],
-                                       b_values[mb_inds], args)
+                    parts = ppo_losses(
+                        agent,
+                        b_obs[mb_inds],
+                        b_masks[mb_inds],
+                        b_actions[mb_inds],
+                        b_logprobs[mb_inds],
+                        b_advantages[mb_inds],
+                        b_returns[mb_inds],
+                        b_values[mb_inds],
+                        args,
+                    )
                     pg_loss, v_loss, entropy = parts[:3]
                     loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
 
@@ -423,15 +448,25 @@ if __name__ == "__main__":
                 row["explained_variance"] = (1 - (y_true - y_pred).var(dim=0).sum() / y_true.var(dim=0).sum()).item()
             # CURRICULUM: the threshold of the next rollout's episodes
             num_selected, num_skipped = curriculum.update_threshold()
-            row |= {"threshold": curriculum.threshold, "selected_episodes": num_selected,
-                    "skipped_episodes": num_skipped, "selected_transitions": len(b_inds)}
+            row |= {
+                "threshold": curriculum.threshold,
+                "selected_episodes": num_selected,
+                "skipped_episodes": num_skipped,
+                "selected_transitions": len(b_inds),
+            }
 
             run.log("updates", row)
             run.time("update", global_step, time.perf_counter() - update_start)
 
-            state = {"agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
-                     "episode": episode, "next_obs": next_obs, "next_done": next_done,
-                     "episode_returns": episode_returns}
+            state = {
+                "agent": agent.state_dict(),
+                "optimizer": optimizer.state_dict(),
+                "iteration": iteration,
+                "episode": episode,
+                "next_obs": next_obs,
+                "next_done": next_done,
+                "episode_returns": episode_returns,
+            }
             # CURRICULUM
             state |= {"curriculum": vars(curriculum), "scores": scores, "thresholds": thresholds, "selected": selected}
 

@@ -192,8 +192,17 @@ if __name__ == "__main__":
     args = protocol.parse(Args)
     env_kwargs = protocol.prepare(args)
     episode_columns = protocol.EPISODE_COLUMNS
-    update_columns = ("iteration", "global_step", "policy_loss", "value_loss", "entropy", "old_approx_kl",
-                      "approx_kl", "clip_fraction", "explained_variance")
+    update_columns = (
+        "iteration",
+        "global_step",
+        "policy_loss",
+        "value_loss",
+        "entropy",
+        "old_approx_kl",
+        "approx_kl",
+        "clip_fraction",
+        "explained_variance",
+    )
 
     with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
         # TRY NOT TO MODIFY: seeding
@@ -273,9 +282,16 @@ if __name__ == "__main__":
                     episode += 1
                     carbon, thaw = episode_returns[i]
                     scalarized_return = protocol.scalarize(carbon, thaw, preferences[i])
-                    row = {"global_step": global_step, "episode": episode, "env": i, "preference": preferences[i],
-                           "carbon_return": carbon, "thaw_return": thaw, "scalarized_return": scalarized_return,
-                           **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO))}
+                    row = {
+                        "global_step": global_step,
+                        "episode": episode,
+                        "env": i,
+                        "preference": preferences[i],
+                        "carbon_return": carbon,
+                        "thaw_return": thaw,
+                        "scalarized_return": scalarized_return,
+                        **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO)),
+                    }
 
                     run.log("episodes", row)
                     progress.returns.append((carbon, thaw))
@@ -313,9 +329,17 @@ if __name__ == "__main__":
                 np.random.shuffle(b_inds)
                 for minibatch in range(num_minibatches):
                     mb_inds = b_inds[minibatch::num_minibatches]
-                    parts = ppo_losses(agent, b_obs[mb_inds], b_masks[mb_inds], b_actions[mb_inds],
-                                       b_logprobs[mb_inds], b_advantages[mb_inds], b_returns[mb_inds],
-                                       b_values[mb_inds], args)
+                    parts = ppo_losses(
+                        agent,
+                        b_obs[mb_inds],
+                        b_masks[mb_inds],
+                        b_actions[mb_inds],
+                        b_logprobs[mb_inds],
+                        b_advantages[mb_inds],
+                        b_returns[mb_inds],
+                        b_values[mb_inds],
+                        args,
+                    )
                     pg_loss, v_loss, entropy = parts[:3]
                     loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
 
@@ -335,9 +359,15 @@ if __name__ == "__main__":
             run.log("updates", row)
             run.time("update", global_step, time.perf_counter() - update_start)
 
-            state = {"agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "iteration": iteration,
-                     "episode": episode, "next_obs": next_obs, "next_done": next_done,
-                     "episode_returns": episode_returns}
+            state = {
+                "agent": agent.state_dict(),
+                "optimizer": optimizer.state_dict(),
+                "iteration": iteration,
+                "episode": episode,
+                "next_obs": next_obs,
+                "next_done": next_done,
+                "episode_returns": episode_returns,
+            }
 
             run.save(global_step, last=iteration == num_iterations, **state)
 

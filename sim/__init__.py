@@ -3,6 +3,7 @@
 `simulate` runs one stand and returns a table; `Stands` steps many, for the environment. `sample_site` draws the 62
 parameters of a site. `docs/model.md` has the equations.
 """
+
 from sim.closure import PhysicsError
 from sim.draws import Seeds, episode_seeds
 from sim.jit import cache_folder
@@ -13,6 +14,18 @@ from sim.stands import Stands
 from sim.state import RECORD_NAMES
 
 __all__ = [
-    "CONSTANTS", "INITIAL_RANGES", "MECHANISMS", "RECORD_NAMES", "SITE_PARAMETERS", "PhysicsError", "Seeds", "Stands",
-    "cache_folder", "episode_seeds", "middle_site", "sample_site", "scale_site", "simulate",
-]  # fmt: skip
+    "CONSTANTS",
+    "INITIAL_RANGES",
+    "MECHANISMS",
+    "RECORD_NAMES",
+    "SITE_PARAMETERS",
+    "PhysicsError",
+    "Seeds",
+    "Stands",
+    "cache_folder",
+    "episode_seeds",
+    "middle_site",
+    "sample_site",
+    "scale_site",
+    "simulate",
+]

@@ -1,4 +1,5 @@
 """The year's account: stocks at its beginning and end, means, and what it failed to close."""
+
 import math
 
 from sim.demography import OLDEST, SAPLING_LIMIT, SEEDLING_LIMIT, count
@@ -54,9 +55,13 @@ def write_record(b, i):
     products_change = s.products[i] - w.products_before[i]
     r.net_carbon_change_kgc_m2[i] = r.biomass_change_kgc_m2[i] + r.soil_change_kgc_m2[i] + products_change
     crossed = (
-        r.gpp_kgc_m2[i] - r.autotrophic_respiration_kgc_m2[i] - r.heterotrophic_respiration_kgc_m2[i]
-        - r.fire_loss_kgc_m2[i] - r.harvest_emission_kgc_m2[i] - r.hwp_decay_kgc_m2[i]
-    )  # fmt: skip
+        r.gpp_kgc_m2[i]
+        - r.autotrophic_respiration_kgc_m2[i]
+        - r.heterotrophic_respiration_kgc_m2[i]
+        - r.fire_loss_kgc_m2[i]
+        - r.harvest_emission_kgc_m2[i]
+        - r.hwp_decay_kgc_m2[i]
+    )
     r.annual_carbon_residual_kgc_m2[i] = abs(r.net_carbon_change_kgc_m2[i] - crossed)
     r.stems_residual_ha[i] = abs(density - w.stems_before[i] - w.stems_gain[i])
     r.summer_albedo[i] = w.summer_up[i] / w.summer_down[i] if w.summer_down[i] > 0.0 else math.nan
@@ -65,8 +70,17 @@ def write_record(b, i):
     freezes = p.soil_freezing[i]
     thawed, frozen = p.soil_heat_capacity_thawed[i], p.soil_heat_capacity_frozen[i]
     r.active_layer_depth_m[i] = thaw_depth(
-        s.organic_depth[i] * p.moss[i], w.thaw_warmth[i], w.thaw_seconds[i], r.deep_soil_temperature_c[i],
-        p.deep_boundary_temperature_k[i] - FREEZING_POINT_K, p.deep_soil_node_m[i], p.boundary_depth_m[i],
-        p.soil_conductivity[i], p.soil_conductivity[i] * w.frozen_ratio[i], p.organic_conductivity_thawed[i],
-        thawed, thawed + freezes * (frozen - thawed), w.surface_latent[i] / p.surface_soil_depth_m[i],
-    )  # fmt: skip
+        s.organic_depth[i] * p.moss[i],
+        w.thaw_warmth[i],
+        w.thaw_seconds[i],
+        r.deep_soil_temperature_c[i],
+        p.deep_boundary_temperature_k[i] - FREEZING_POINT_K,
+        p.deep_soil_node_m[i],
+        p.boundary_depth_m[i],
+        p.soil_conductivity[i],
+        p.soil_conductivity[i] * w.frozen_ratio[i],
+        p.organic_conductivity_thawed[i],
+        thawed,
+        thawed + freezes * (frozen - thawed),
+        w.surface_latent[i] / p.surface_soil_depth_m[i],
+    )

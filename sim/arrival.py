@@ -1,4 +1,5 @@
 """What reaches canopy and ground in a step: light, snow and rain, phase by phase over the lanes of a block."""
+
 from sim.canopy import stress_ramp
 from sim.carbon import photosynthesis
 from sim.interception import intercepted, snow_capacity, snow_melt, snow_sublimation, unloaded
@@ -37,20 +38,37 @@ def sunlight(b):
         )
         ground = surface_albedo(s.swe[i], w.snow_hiding[i], s.albedo[i], p.ground_albedo[i])
         w.canopy_sw[i], w.ground_sw[i], w.reflected[i], light_conifer, light_deciduous = shortwave(
-            w.shortwave[i], w.diffuse[i], beam_conifer, beam_deciduous, w.sky_conifer[i], w.sky_deciduous[i],
-            p.albedo_conifer[i], p.albedo_deciduous[i], ground,
-        )  # fmt: skip
+            w.shortwave[i],
+            w.diffuse[i],
+            beam_conifer,
+            beam_deciduous,
+            w.sky_conifer[i],
+            w.sky_deciduous[i],
+            p.albedo_conifer[i],
+            p.albedo_deciduous[i],
+            ground,
+        )
         stress = w.water_stress[i]
         dry_conifer = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], w.dryness_conifer[i])
         dry_deciduous = 1.0 - stress_ramp(w.deficit[i], p.vpd_low_hpa[i], w.dryness_deciduous[i])
         w.gpp_conifer[i] = photosynthesis(
-            light_conifer, w.leaf_conifer[i], w.light_use_conifer[i], p.par_fraction[i],
-            w.temperature_stress_conifer[i], dry_conifer, stress,
-        )  # fmt: skip
+            light_conifer,
+            w.leaf_conifer[i],
+            w.light_use_conifer[i],
+            p.par_fraction[i],
+            w.temperature_stress_conifer[i],
+            dry_conifer,
+            stress,
+        )
         w.gpp_deciduous[i] = photosynthesis(
-            light_deciduous, w.leaf_deciduous[i], w.light_use_deciduous[i], p.par_fraction[i],
-            w.temperature_stress_deciduous[i], dry_deciduous, stress,
-        )  # fmt: skip
+            light_deciduous,
+            w.leaf_deciduous[i],
+            w.light_use_deciduous[i],
+            p.par_fraction[i],
+            w.temperature_stress_deciduous[i],
+            dry_deciduous,
+            stress,
+        )
         w.fixed[i] = 1000.0 * p.photosynthesis_energy[i] * (w.gpp_conifer[i] + w.gpp_deciduous[i])
 
         # Stomata open in light and above freezing; a lane in the dark is as in `darkness`, whatever its neighbours.
@@ -96,9 +114,17 @@ def snowfall(b, seconds):
         ground_emission = black_body(s.ground[i] + FREEZING_POINT_K)
         net = w.canopy_sw[i] + w.longwave_cover[i] * (w.sky[i] + ground_emission - 2.0 * w.air_emission[i])
         lost = snow_sublimation(
-            store, per_capacity, p.sublimation_exposure[i], net, w.canopy_air[i], w.deficit[i],
-            w.saturation_slope[i], PSYCHROMETRIC_OVER_ICE * p.air_pressure_hpa[i], LATENT_HEAT_SUBLIMATION, seconds,
-        )  # fmt: skip
+            store,
+            per_capacity,
+            p.sublimation_exposure[i],
+            net,
+            w.canopy_air[i],
+            w.deficit[i],
+            w.saturation_slope[i],
+            PSYCHROMETRIC_OVER_ICE * p.air_pressure_hpa[i],
+            LATENT_HEAT_SUBLIMATION,
+            seconds,
+        )
         store -= lost
         melted = snow_melt(store, per_capacity, w.air[i], w.canopy_air[i], LATENT_HEAT_FUSION, seconds)
         store -= melted
@@ -116,9 +142,17 @@ def snowfall(b, seconds):
         mixed = heat / (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i])
         s.ground[i] = mixed if ground_snow > 0.0 else s.ground[i]
         aged = snow_albedo(
-            s.albedo[i], s.ground[i], ground_snow, p.snow_albedo_fresh[i], p.snow_albedo_cold[i], p.snow_albedo_old[i],
-            p.snow_albedo_cold_hours[i], p.snow_albedo_melt_hours[i], p.snow_albedo_refresh_mm[i], seconds,
-        )  # fmt: skip
+            s.albedo[i],
+            s.ground[i],
+            ground_snow,
+            p.snow_albedo_fresh[i],
+            p.snow_albedo_cold[i],
+            p.snow_albedo_old[i],
+            p.snow_albedo_cold_hours[i],
+            p.snow_albedo_melt_hours[i],
+            p.snow_albedo_refresh_mm[i],
+            seconds,
+        )
         s.albedo[i] = aged if s.swe[i] > 0.0 else p.snow_albedo_fresh[i]
 
 
@@ -140,9 +174,7 @@ def rainfall(b):
     """Rain and melt held by the canopy; what drips or falls through reaches the soil."""
     s, w = b.s, b.w
     for i in range(len(s.swe)):
-        held = intercepted(
-            w.rain[i], s.canopy_rain[i], w.rain_capacity[i], w.per_rain_capacity[i], w.longwave_cover[i]
-        )
+        held = intercepted(w.rain[i], s.canopy_rain[i], w.rain_capacity[i], w.per_rain_capacity[i], w.longwave_cover[i])
         wet = s.canopy_rain[i] + held + w.canopy_melt[i]
         drip = max(wet - w.rain_capacity[i], 0.0)
         s.canopy_rain[i] = wet - drip

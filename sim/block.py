@@ -2,6 +2,7 @@
 
 Stands are rows of arrays, (stands, fields); a block has them as lanes of `sim.state.block_dtype`.
 """
+
 import functools
 import math
 import threading

@@ -4,6 +4,7 @@ The canopy stores no heat; its temperature is where radiation, sensible heat, ev
 the trunk balance. The ground and the trunk answer to it within the same step (`sim.soil.respond_to_canopy`), so that
 all nodes exchange radiation at the same temperatures.
 """
+
 import math
 
 from sim.jit import compiled
@@ -53,11 +54,28 @@ def stress_ramp(value, zero, slope) -> float:
 
 @compiled
 def canopy_balance(
-    canopy, fixed, shortwave_absorbed, sky, cover, ground_emissivity,
-    ground, melt_span, bare_gain, ground_base, ground_by_emission, ground_by_canopy,
-    trunk_base, trunk_by_canopy, trunk_by_ground, trunk_conductance,
-    air, air_conductance, dry_coefficient, wet_coefficient, wet_limit,
-):  # fmt: skip
+    canopy,
+    fixed,
+    shortwave_absorbed,
+    sky,
+    cover,
+    ground_emissivity,
+    ground,
+    melt_span,
+    bare_gain,
+    ground_base,
+    ground_by_emission,
+    ground_by_canopy,
+    trunk_base,
+    trunk_by_canopy,
+    trunk_by_ground,
+    trunk_conductance,
+    air,
+    air_conductance,
+    dry_coefficient,
+    wet_coefficient,
+    wet_limit,
+):
     """Energy balance of the canopy at a trial temperature.
 
     canopy : trial canopy temperature [degC]; fixed : energy used by photosynthesis, snow melt and sublimation

@@ -1,4 +1,5 @@
 """Photosynthesis, respiration, litter. Fluxes in kgC m-2 per second or per day, pools in kgC m-2."""
+
 from sim.jit import compiled
 from sim.mathematics import exponential
 

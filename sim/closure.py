@@ -1,4 +1,5 @@
 """Whether a year closed: the tolerances, and the error that has what it takes to replay a year that did not."""
+
 import numpy as np
 
 from sim.state import PARAMETER_NAMES, RECORD_NAMES, STATE_NAMES

@@ -1,4 +1,5 @@
 """What is done once a day: weather, the canopy's structure, fire, litter; and the day's account at its end."""
+
 import numpy as np
 
 from sim.canopy import leaf_out, stress_ramp
@@ -81,9 +82,10 @@ def canopy_structure(b, day):
             w.minimum_temperature[i], p.tmin_low_conifer[i], 1.0 / (p.tmin_high_conifer[i] - p.tmin_low_conifer[i])
         )
         w.temperature_stress_deciduous[i] = stress_ramp(
-            w.minimum_temperature[i], p.tmin_low_deciduous[i],
+            w.minimum_temperature[i],
+            p.tmin_low_deciduous[i],
             1.0 / (p.tmin_high_deciduous[i] - p.tmin_low_deciduous[i]),
-        )  # fmt: skip
+        )
         wind_exchange(b, i, p.wind_speed_m_s[i])
         w.vapour_density[i] = w.air_density[i] * 0.622 / p.air_pressure_hpa[i]
 

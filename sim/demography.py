@@ -2,6 +2,7 @@
 
 Stems are real numbers per hectare in arrays (AGES, lanes); the last row pools all beyond 100 years.
 """
+
 from sim.jit import compiled, phase
 from sim.mathematics import exponential
 

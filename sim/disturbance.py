@@ -1,4 +1,5 @@
 """Fire and insects: their hazards, and what they do to a stand. Their dice are drawn before the year begins."""
+
 from sim.demography import OLDEST, count, kill, remove_share
 from sim.jit import compiled, phase
 from sim.structure import crown_areas
@@ -39,9 +40,12 @@ def fire(b, day, i):
     )
     r.drought_index[i] = max(r.drought_index[i], s.drought[i])
     hazard = fire_hazard(
-        p.fire_base_probability[i], w.cover_conifer[i], w.cover_deciduous[i],
-        p.flammability_conifer[i], p.flammability_deciduous[i],
-    )  # fmt: skip
+        p.fire_base_probability[i],
+        w.cover_conifer[i],
+        w.cover_deciduous[i],
+        p.flammability_conifer[i],
+        p.flammability_deciduous[i],
+    )
     summer = p.summer_start_day[i] <= day + 1 < p.summer_end_day[i]
     ready = fire_weather(s.drought[i], w.mean_temperature[i], p.fire_drought_threshold[i], p.fire_temperature_c[i])
     if not (summer and ready and p.fire[i] > 0.0 and r.fire_mortality[i] == 0.0 and d.fire_dice[day, i] < hazard):

@@ -1,4 +1,5 @@
 """All the random numbers of a year, drawn before it begins: always as many, whatever the stand does."""
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,4 +1,5 @@
 """The day's weather, generated from the site's climate or observed, and the sun."""
+
 import math
 
 from sim.jit import phase
@@ -46,15 +47,26 @@ def generated_weather(b, day):
         memory = p.temperature_persistence[i]
         w.anomaly[i] = spread if first else memory * w.anomaly[i] + math.sqrt(1.0 - memory * memory) * spread
         temperature = daily_mean_temperature(
-            cosine, sine, w.cos_warmest[i], w.sin_warmest[i],
-            p.mean_annual_temperature_c[i], p.seasonal_amplitude_c[i], w.anomaly[i],
-        )  # fmt: skip
+            cosine,
+            sine,
+            w.cos_warmest[i],
+            w.sin_warmest[i],
+            p.mean_annual_temperature_c[i],
+            p.seasonal_amplitude_c[i],
+            w.anomaly[i],
+        )
         kind = precipitation_season(
-            day + 1, temperature, p.summer_start_day[i], p.summer_end_day[i],
-            p.spring_shoulder_start_day[i], p.spring_shoulder_end_day[i],
-            p.autumn_shoulder_start_day[i], p.autumn_shoulder_end_day[i],
-            p.snow_season_end_day[i], p.snow_season_start_day[i],
-        )  # fmt: skip
+            day + 1,
+            temperature,
+            p.summer_start_day[i],
+            p.summer_end_day[i],
+            p.spring_shoulder_start_day[i],
+            p.spring_shoulder_end_day[i],
+            p.autumn_shoulder_start_day[i],
+            p.autumn_shoulder_end_day[i],
+            p.snow_season_end_day[i],
+            p.snow_season_start_day[i],
+        )
         winter, shoulder = kind == 0, kind == 1
         probability = p.summer_rain_prob[i]
         mean = p.summer_rain_mm_day[i]
@@ -87,29 +99,38 @@ def generated_weather(b, day):
         w.vapour[i] = humidity * saturation_pressure_water(temperature)
 
         dry_clearness = of_season(
-            day, p.clearness_dry_winter[i], p.clearness_dry_spring[i],
-            p.clearness_dry_summer[i], p.clearness_dry_autumn[i],
-        )  # fmt: skip
+            day,
+            p.clearness_dry_winter[i],
+            p.clearness_dry_spring[i],
+            p.clearness_dry_summer[i],
+            p.clearness_dry_autumn[i],
+        )
         wet_clearness = of_season(
-            day, p.clearness_wet_winter[i], p.clearness_wet_spring[i],
-            p.clearness_wet_summer[i], p.clearness_wet_autumn[i],
-        )  # fmt: skip
+            day,
+            p.clearness_wet_winter[i],
+            p.clearness_wet_spring[i],
+            p.clearness_wet_summer[i],
+            p.clearness_wet_autumn[i],
+        )
         clearness = wet_clearness if wet else dry_clearness
         dry_cloud = of_season(
             day, p.cloud_dry_winter[i], p.cloud_dry_spring[i], p.cloud_dry_summer[i], p.cloud_dry_autumn[i]
         )
-        wet_cloud = of_season(
-            day, p.cloud_wet_cold[i], p.cloud_wet_warm[i], p.cloud_wet_warm[i], p.cloud_wet_cold[i]
-        )  # fmt: skip
+        wet_cloud = of_season(day, p.cloud_wet_cold[i], p.cloud_wet_warm[i], p.cloud_wet_warm[i], p.cloud_wet_cold[i])
         w.emissivity[i] = sky_emissivity(temperature, w.vapour[i], wet_cloud if wet else dry_cloud)
         w.top_of_canopy[i] = clearness * w.extraterrestrial[i]
         w.diffuse[i] = diffuse_share(clearness)
 
         noon = min(max(w.sun_a[i] + w.sun_b[i], 0.0) / p.diurnal_full_sun[i], 1.0)
         w.amplitude[i] = diurnal_amplitude(
-            p.diurnal_amplitude_c[i], precipitation, p.rain_diurnal_sensitivity[i], p.rain_diurnal_threshold_mm[i],
-            p.max_diurnal_reduction[i], p.min_diurnal_amplitude_c[i], noon,
-        )  # fmt: skip
+            p.diurnal_amplitude_c[i],
+            precipitation,
+            p.rain_diurnal_sensitivity[i],
+            p.rain_diurnal_threshold_mm[i],
+            p.max_diurnal_reduction[i],
+            p.min_diurnal_amplitude_c[i],
+            noon,
+        )
         w.mean_temperature[i] = temperature
         w.minimum_temperature[i] = temperature - w.amplitude[i]
         w.precipitation[i] = precipitation

@@ -2,6 +2,7 @@
 
 per_capacity : 1 / capacity, or 0 where nothing can be held; of the load, which several processes need.
 """
+
 from sim.jit import compiled
 from sim.mathematics import two_thirds_power
 

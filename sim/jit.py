@@ -10,6 +10,7 @@ callee of another file: the cache folder is named by a hash of all of `sim/`. An
 of the compiling process, so that kernels for one and for sixteen lanes, compiled by two processes, are taken for each
 other in a third: each number of lanes gets functions with names of their own.
 """
+
 import functools
 import hashlib
 import os

@@ -2,6 +2,7 @@
 
 One rule, `feasible_change`, serves the transition here, the action mask and the penalty in `boreal_env`.
 """
+
 import numpy as np
 
 from sim.demography import AGE_CLASSES, OLDEST, SAPLING_LIMIT, count, remove_share, total_weight

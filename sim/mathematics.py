@@ -3,6 +3,7 @@
 libm's functions are calls that stop the compiler from treating eight stands at a time; plain arithmetic does not, and
 it gives the same bits for one stand as for sixteen.
 """
+
 import numpy as np
 
 from sim.jit import compiled

@@ -4,6 +4,7 @@
 `constants.csv`: literature constants, one value each. Both have physical limits, a unit and a source, and both
 are passed to the compiled physics at run time: changing one recompiles nothing.
 """
+
 import csv
 import difflib
 import math

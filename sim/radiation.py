@@ -2,6 +2,7 @@
 
 Fluxes in W m-2 of ground area, transmissivities and albedos as shares.
 """
+
 from sim.jit import compiled
 from sim.mathematics import exponential
 from sim.weather import STEFAN_BOLTZMANN
@@ -28,9 +29,16 @@ def canopy_interception(path, crown_area, share_conifer, optical_conifer, optica
 
 @compiled
 def shortwave(
-    incoming, diffuse, beam_conifer, beam_deciduous, sky_conifer, sky_deciduous,
-    albedo_conifer, albedo_deciduous, ground_albedo,
-):  # fmt: skip
+    incoming,
+    diffuse,
+    beam_conifer,
+    beam_deciduous,
+    sky_conifer,
+    sky_deciduous,
+    albedo_conifer,
+    albedo_deciduous,
+    ground_albedo,
+):
     """Shortwave absorbed by canopy and ground, reflected to the sky, and intercepted from above by each species.
 
     beam_*, sky_* : intercepted shares of direct and of hemispheric light. Light reflected by the ground meets the

@@ -1,4 +1,5 @@
 """The scientist's door: one stand, given actions, generated or observed weather, a table out."""
+
 import numpy as np
 import pandas as pd
 
@@ -21,9 +22,21 @@ FORCING_LIMITS = {
 
 
 def simulate(
-    site, actions, *, seed, years=50, time_step_minutes=30, backend="numba", forcing=None, initial=None,
-    output="annual", constants=None, mechanisms=None, hwp_half_life_years=None, harvest_min_class="young",
-):  # fmt: skip
+    site,
+    actions,
+    *,
+    seed,
+    years=50,
+    time_step_minutes=30,
+    backend="numba",
+    forcing=None,
+    initial=None,
+    output="annual",
+    constants=None,
+    mechanisms=None,
+    hwp_half_life_years=None,
+    harvest_min_class="young",
+):
     """Simulate one stand.
 
     Parameters
@@ -58,9 +71,14 @@ def simulate(
     per_year = np.full(years, actions) if np.ndim(actions) == 0 else np.asarray(actions)
     check_actions(per_year, years)
     stand = Stands(
-        1, time_step_minutes=time_step_minutes, backend=backend, constants=constants, mechanisms=mechanisms,
-        hwp_half_life_years=hwp_half_life_years, harvest_min_class=harvest_min_class,
-    )  # fmt: skip
+        1,
+        time_step_minutes=time_step_minutes,
+        backend=backend,
+        constants=constants,
+        mechanisms=mechanisms,
+        hwp_half_life_years=hwp_half_life_years,
+        harvest_min_class=harvest_min_class,
+    )
     observed, days = None, DAYS
     if forcing is not None:
         observed, days = check_forcing(forcing, time_step_minutes, years)

@@ -1,5 +1,6 @@
 """Snow on the ground: albedo, insulation, exchange with the air. The snow node is the snow's surface; its whole
 depth lies between it and the soil. Without snow the node is the ground's skin of moss and litter."""
+
 import math
 
 from sim.jit import compiled

@@ -4,6 +4,7 @@ Enthalpy in J m-2 with 0 at thawed soil of 0 degC. The water that freezes is a p
 the bucket of `sim.water`. Where several functions divide by the freezing range, each multiplies by 1 / range: the
 compiler makes one division of them all.
 """
+
 import math
 
 from sim.jit import compiled
@@ -66,12 +67,30 @@ def organic_layer(depth, conifer, deciduous, depth_conifer, depth_deciduous, dep
 
 @compiled
 def respond_to_canopy(
-    trunk, trunk_inertia, trunk_canopy, trunk_air, trunk_ground,
-    ground, ground_inertia, ground_air, ground_source, ground_emission, ground_emission_slope, vapour_slope,
-    ground_emissivity, cover, air,
-    surface, surface_inertia, ground_surface,
-    deep, deep_inertia, surface_deep, deep_boundary, boundary,
-):  # fmt: skip
+    trunk,
+    trunk_inertia,
+    trunk_canopy,
+    trunk_air,
+    trunk_ground,
+    ground,
+    ground_inertia,
+    ground_air,
+    ground_source,
+    ground_emission,
+    ground_emission_slope,
+    vapour_slope,
+    ground_emissivity,
+    cover,
+    air,
+    surface,
+    surface_inertia,
+    ground_surface,
+    deep,
+    deep_inertia,
+    surface_deep,
+    deep_boundary,
+    boundary,
+):
     """Answer of trunk, ground and soil to the canopy within an implicit step, from the bottom up.
 
     Temperatures in degC at the start of the step, inertias (heat capacity / time step) and conductances in
@@ -115,16 +134,37 @@ def respond_to_canopy(
     ground_by_emission = ground_emissivity * cover * yielding
     ground_by_canopy = trunk_ground * trunk_by_canopy * yielding
     return (
-        deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base, trunk_by_canopy, trunk_by_ground,
-        ground_base, ground_by_emission, ground_by_canopy, stiffness, yielding,
-    )  # fmt: skip
+        deep_base,
+        deep_by_surface,
+        surface_base,
+        surface_by_ground,
+        trunk_base,
+        trunk_by_canopy,
+        trunk_by_ground,
+        ground_base,
+        ground_by_emission,
+        ground_by_canopy,
+        stiffness,
+        yielding,
+    )
 
 
 @compiled
 def thaw_depth(
-    organic, warmth, seconds, deep, boundary, deep_node, boundary_depth,
-    thawed_conductivity, frozen_conductivity, organic_conductivity, thawed_capacity, frozen_capacity, latent,
-):  # fmt: skip
+    organic,
+    warmth,
+    seconds,
+    deep,
+    boundary,
+    deep_node,
+    boundary_depth,
+    thawed_conductivity,
+    frozen_conductivity,
+    organic_conductivity,
+    thawed_capacity,
+    frozen_capacity,
+    latent,
+):
     """Active-layer depth [m], from the organic surface; down to the permafrost where that lies below the deep node.
 
     Stefan's: what a season's warmth at the ground [K s], `seconds` long, conducts through organic layer and thawed soil

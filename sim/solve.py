@@ -1,4 +1,5 @@
 """The temperatures of a step: conductances, the nodes' answer to the canopy, and Newton's method for the canopy."""
+
 from sim.canopy import NEWTON_LIMIT, NEWTON_TOLERANCE, canopy_balance, newton_step
 from sim.jit import compiled
 from sim.radiation import black_body, black_body_slope, longwave_down
@@ -26,9 +27,13 @@ def ground_exchange(b):
     s, p, w = b.s, b.p, b.w
     for i in range(len(s.swe)):
         w.ground_exchange[i] = w.ground_velocity[i] * stability(
-            s.ground[i], w.air[i], w.wind_below[i], p.ground_reference_height_m[i],
-            p.stability_factor[i], p.instability_limit[i],
-        )  # fmt: skip
+            s.ground[i],
+            w.air[i],
+            w.wind_below[i],
+            p.ground_reference_height_m[i],
+            p.stability_factor[i],
+            p.instability_limit[i],
+        )
 
 
 @compiled
@@ -115,19 +120,46 @@ def conductances(b, seconds):
             w.deep[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], p.soil_freezing_range_k[i]
         )
         (
-            w.deep_base[i], w.deep_by_surface[i], w.surface_base[i], w.surface_by_ground[i], w.trunk_base[i],
-            w.trunk_by_canopy[i], w.trunk_by_ground[i], w.ground_base[i], w.ground_by_emission[i],
-            w.ground_by_canopy[i], stiffness, yielding,
+            w.deep_base[i],
+            w.deep_by_surface[i],
+            w.surface_base[i],
+            w.surface_by_ground[i],
+            w.trunk_base[i],
+            w.trunk_by_canopy[i],
+            w.trunk_by_ground[i],
+            w.ground_base[i],
+            w.ground_by_emission[i],
+            w.ground_by_canopy[i],
+            stiffness,
+            yielding,
         ) = respond_to_canopy(
-            s.trunk[i], s.trunk_capacity[i] * per_second, w.trunk_canopy[i], w.trunk_air[i], w.trunk_ground[i],
-            s.ground[i], (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) * per_second, w.ground_conductance[i],
-            w.ground_sw[i] + p.ground_emissivity[i] * (1.0 - w.longwave_cover[i]) * w.sky[i]
-            - w.ground_latent[i] + w.latent_slope[i] * (ice - s.ground[i]),
-            emission, emission_slope, w.latent_slope[i], p.ground_emissivity[i], w.longwave_cover[i], w.air[i],
-            w.surface[i], surface_inertia, w.surface_conductance[i],
-            w.deep[i], deep_inertia, w.deep_conductance[i], w.boundary_conductance[i],
+            s.trunk[i],
+            s.trunk_capacity[i] * per_second,
+            w.trunk_canopy[i],
+            w.trunk_air[i],
+            w.trunk_ground[i],
+            s.ground[i],
+            (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) * per_second,
+            w.ground_conductance[i],
+            w.ground_sw[i]
+            + p.ground_emissivity[i] * (1.0 - w.longwave_cover[i]) * w.sky[i]
+            - w.ground_latent[i]
+            + w.latent_slope[i] * (ice - s.ground[i]),
+            emission,
+            emission_slope,
+            w.latent_slope[i],
+            p.ground_emissivity[i],
+            w.longwave_cover[i],
+            w.air[i],
+            w.surface[i],
+            surface_inertia,
+            w.surface_conductance[i],
+            w.deep[i],
+            deep_inertia,
+            w.deep_conductance[i],
+            w.boundary_conductance[i],
             boundary,
-        )  # fmt: skip
+        )
         # At 0 degC some snow sublimates and the rest can melt; beyond, its heat capacity and its vapour are gone.
         sublimating = (w.ground_latent[i] - w.latent_slope[i] * ice) * (seconds / LATENT_HEAT_SUBLIMATION)
         meltable = s.swe[i] - sublimating if snow else 0.0
@@ -146,12 +178,28 @@ def newton_iteration(b):
     for i in range(len(s.swe)):
         trial, low, high = w.trial[i], w.low[i], w.high[i]
         residual, slope, by_emission, w.net[i], w.ground_new[i] = canopy_balance(
-            trial, w.fixed[i], w.canopy_sw[i], w.sky[i], w.longwave_cover[i], p.ground_emissivity[i],
-            s.ground[i], w.melt_span[i], w.bare_gain[i],
-            w.ground_base[i], w.ground_by_emission[i], w.ground_by_canopy[i],
-            w.trunk_base[i], w.trunk_by_canopy[i], w.trunk_by_ground[i], w.trunk_canopy[i],
-            w.air[i], w.canopy_air[i], w.dry_coefficient[i], w.wet_coefficient[i], w.wet_limit[i],
-        )  # fmt: skip
+            trial,
+            w.fixed[i],
+            w.canopy_sw[i],
+            w.sky[i],
+            w.longwave_cover[i],
+            p.ground_emissivity[i],
+            s.ground[i],
+            w.melt_span[i],
+            w.bare_gain[i],
+            w.ground_base[i],
+            w.ground_by_emission[i],
+            w.ground_by_canopy[i],
+            w.trunk_base[i],
+            w.trunk_by_canopy[i],
+            w.trunk_by_ground[i],
+            w.trunk_canopy[i],
+            w.air[i],
+            w.canopy_air[i],
+            w.dry_coefficient[i],
+            w.wet_coefficient[i],
+            w.wet_limit[i],
+        )
         off = abs(residual) > NEWTON_TOLERANCE  # not where it is no number: that stays, for closure to find
         proposal, low, high = newton_step(trial, residual, slope, by_emission, low, high)
         w.residual[i] = residual

@@ -3,6 +3,7 @@
 Soil, snow and water start near the site's means and are spun up under the mean year of its climate, with the stand
 held fixed. Deep soil remembers decades, more where it freezes; a secant search on its heat finds the balance in a few.
 """
+
 import math
 
 import numpy as np

@@ -4,6 +4,7 @@ Each stand's parameters, state, draws and record are rows of four arrays, (stand
 sixteen stands into the lanes of a block, calls the compiled kernel, and copies them back; blocks run on a pool of
 threads. So any subset of stands can be stepped together, in any order, with the same bits.
 """
+
 import os
 from concurrent.futures import ThreadPoolExecutor
 from numbers import Real
@@ -56,9 +57,17 @@ class Stands:
     """
 
     def __init__(
-        self, number, *, time_step_minutes=30, backend="numba", constants=None, mechanisms=None,
-        hwp_half_life_years=None, harvest_min_class="young", threads=None,
-    ):  # fmt: skip
+        self,
+        number,
+        *,
+        time_step_minutes=30,
+        backend="numba",
+        constants=None,
+        mechanisms=None,
+        hwp_half_life_years=None,
+        harvest_min_class="young",
+        threads=None,
+    ):
         self.number = _positive_integer("number of stands", number)
         minutes = _positive_integer("time_step_minutes", time_step_minutes)
         if 1440 % minutes:
@@ -205,10 +214,18 @@ class Stands:
         def run(chunk):
             rows = None if daily is None else daily[chunk]
             state[chunk], record[chunk] = run_block(
-                self.parameters[stands[chunk]], self.state[stands[chunk]], draws[chunk], actions[chunk],
-                observed, days, rows, steps_per_day=steps_per_day or self.steps_per_day, backend=self.backend,
-                first_cut_age=self.first_cut_age, products_decay=self.products_decay,
-            )  # fmt: skip
+                self.parameters[stands[chunk]],
+                self.state[stands[chunk]],
+                draws[chunk],
+                actions[chunk],
+                observed,
+                days,
+                rows,
+                steps_per_day=steps_per_day or self.steps_per_day,
+                backend=self.backend,
+                first_cut_age=self.first_cut_age,
+                products_decay=self.products_decay,
+            )
 
         chunks = blocks(len(stands))
         if len(chunks) == 1 or self.backend == "python":
@@ -228,9 +245,7 @@ class Stands:
 
 
 #: Stocks that spin-up leaves as they were drawn.
-HELD_IN_SPIN_UP = (
-    "conifer_biomass", "deciduous_biomass", "soil_carbon", "products", "organic_depth", "drought",
-)  # fmt: skip
+HELD_IN_SPIN_UP = ("conifer_biomass", "deciduous_biomass", "soil_carbon", "products", "organic_depth", "drought")
 
 
 def available_cores() -> int:
@@ -252,5 +267,3 @@ def _positive_integer(name, value) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 1:
         raise ValueError(f"{name}: a positive integer is allowed, got {value!r}")
     return int(value)
-
-

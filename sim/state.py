@@ -4,6 +4,7 @@ A lane is one stand. All records nest in one, so that the compiler sees that fie
 eight lanes at a time. `block_dtype(16)` steps sixteen stands in lockstep, `block_dtype(1)` a single one, with the
 same source.
 """
+
 import functools
 
 import numpy as np
@@ -121,18 +122,41 @@ RECORD = {
 
 #: Columns of daily output, in order.
 DAILY = (
-    "air_temperature_c", "precipitation_mm", "gpp_kgc_m2", "autotrophic_respiration_kgc_m2",
-    "heterotrophic_respiration_kgc_m2", "shortwave_mj_m2", "net_radiation_mj_m2", "sensible_heat_mj_m2",
-    "latent_heat_mj_m2", "ground_heat_mj_m2", "boundary_heat_mj_m2", "evapotranspiration_mm", "runoff_mm", "swe_mm",
-    "canopy_snow_mm", "soil_water_mm", "canopy_temperature_c", "ground_temperature_c", "surface_soil_temperature_c",
-    "deep_soil_temperature_c", "albedo", "lai", "organic_layer_m",
+    "air_temperature_c",
+    "precipitation_mm",
+    "gpp_kgc_m2",
+    "autotrophic_respiration_kgc_m2",
+    "heterotrophic_respiration_kgc_m2",
+    "shortwave_mj_m2",
+    "net_radiation_mj_m2",
+    "sensible_heat_mj_m2",
+    "latent_heat_mj_m2",
+    "ground_heat_mj_m2",
+    "boundary_heat_mj_m2",
+    "evapotranspiration_mm",
+    "runoff_mm",
+    "swe_mm",
+    "canopy_snow_mm",
+    "soil_water_mm",
+    "canopy_temperature_c",
+    "ground_temperature_c",
+    "surface_soil_temperature_c",
+    "deep_soil_temperature_c",
+    "albedo",
+    "lai",
+    "organic_layer_m",
     "soil_top_temperature_c",
-)  # fmt: skip
+)
 
 #: Columns of an observed forcing, in order.
 FORCING = (
-    "air_temperature_c", "relative_humidity", "wind_speed_m_s", "shortwave_w_m2", "longwave_w_m2", "precipitation_mm",
-)  # fmt: skip
+    "air_temperature_c",
+    "relative_humidity",
+    "wind_speed_m_s",
+    "shortwave_w_m2",
+    "longwave_w_m2",
+    "precipitation_mm",
+)
 
 
 #: What a step, a day or a year computes and hands on; nothing here lasts beyond the year.

@@ -3,6 +3,7 @@
 Fluxes are computed once, at the temperatures of an implicit step, and then moved between stores. `balance` checks from
 the stores alone that nothing was lost.
 """
+
 from sim.arrival import any_snow, any_sun, darkness, no_snow, rainfall, snowfall, sunlight
 from sim.day import wind_exchange
 from sim.jit import compiled

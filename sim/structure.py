@@ -1,4 +1,5 @@
 """From stems to crowns: cover, the two species' shares, and the light use of old trees."""
+
 from sim.canopy import crown_factor
 from sim.demography import AGES, OLDEST
 from sim.jit import compiled, phase
@@ -15,19 +16,31 @@ def crown_areas(b, i):
     deciduous = 0.0
     for age in range(AGES):
         conifer += s.conifer_stems[age, i] * crown_factor(
-            age, p.crown_conifer_seedling[i], p.crown_conifer_sapling[i], p.crown_conifer_young[i],
-            p.crown_conifer_mature[i], p.crown_conifer_old[i],
-        )  # fmt: skip
+            age,
+            p.crown_conifer_seedling[i],
+            p.crown_conifer_sapling[i],
+            p.crown_conifer_young[i],
+            p.crown_conifer_mature[i],
+            p.crown_conifer_old[i],
+        )
         if p.crown_development[i] > 0.0:
             factor = crown_factor(
-                age, p.crown_deciduous_seedling[i], p.crown_deciduous_sapling[i], p.crown_deciduous_young[i],
-                p.crown_deciduous_mature[i], p.crown_deciduous_old[i],
-            )  # fmt: skip
+                age,
+                p.crown_deciduous_seedling[i],
+                p.crown_deciduous_sapling[i],
+                p.crown_deciduous_young[i],
+                p.crown_deciduous_mature[i],
+                p.crown_deciduous_old[i],
+            )
         else:
             factor = crown_factor(
-                age, p.crown_conifer_seedling[i], p.crown_conifer_sapling[i], p.crown_conifer_young[i],
-                p.crown_conifer_mature[i], p.crown_conifer_old[i],
-            )  # fmt: skip
+                age,
+                p.crown_conifer_seedling[i],
+                p.crown_conifer_sapling[i],
+                p.crown_conifer_young[i],
+                p.crown_conifer_mature[i],
+                p.crown_conifer_old[i],
+            )
         deciduous += s.deciduous_stems[age, i] * factor
     old_conifer = s.conifer_stems[OLDEST, i] * p.crown_conifer_old[i]
     old_deciduous = s.deciduous_stems[OLDEST, i] * factor  # the last age's

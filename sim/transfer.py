@@ -3,6 +3,7 @@
 Enthalpies and stores follow from the fluxes, never the other way round; so a snowpack that melts out or soil that
 freezes within a step needs no correction.
 """
+
 from sim.carbon import autotrophic, q10_factor
 from sim.jit import compiled
 from sim.radiation import black_body, black_body_slope, longwave_down, longwave_up
@@ -56,9 +57,13 @@ def move_energy_and_water(b, seconds):
         carried = ICE_HEAT_CAPACITY * sublimated * s.ground[i]
         heat = (ICE_HEAT_CAPACITY * s.swe[i] + p.skin_heat_capacity[i]) * s.ground[i] - carried
         heat += seconds * (
-            w.ground_sw[i] + p.ground_emissivity[i] * (down - ground_emission)
-            - ground_heat - ground_to_surface + trunk_to_ground - latent
-        )  # fmt: skip
+            w.ground_sw[i]
+            + p.ground_emissivity[i] * (down - ground_emission)
+            - ground_heat
+            - ground_to_surface
+            + trunk_to_ground
+            - latent
+        )
         s.swe[i] -= sublimated
         melted = min(max(heat, 0.0) * (1.0 / LATENT_HEAT_FUSION), s.swe[i]) if snow else 0.0
         heat -= LATENT_HEAT_FUSION * melted

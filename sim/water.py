@@ -1,4 +1,5 @@
 """Soil water: one bucket. Amounts in mm."""
+
 from sim.jit import compiled
 
 LARGEST_EVAPORATION = 4e-4  # mm s-1, the latent heat of 1000 W m-2

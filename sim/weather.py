@@ -3,6 +3,7 @@
 Temperatures in degC, vapour pressures in hPa, fluxes in W m-2, precipitation in mm. The hourly cosine of
 temperature and the sun's path are resolved at the model's step; all else holds for the day.
 """
+
 import math
 
 from sim.jit import compiled

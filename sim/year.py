@@ -2,6 +2,7 @@
 
 A pure function of parameters, state, action and the year's random draws, all in the block `b` (see `sim.state`).
 """
+
 import math
 
 import numpy as np
@@ -91,13 +92,27 @@ def manage(b, i):
         cut_conifers = conifers_to_cut(cut, w.mix[i], conifers, deciduous, harvestable_conifers, harvestable_deciduous)
         young, mature = int(p.young_age_limit[i]), int(p.mature_age_limit[i])
         share_conifer = cut_oldest(
-            s.conifer_stems, i, cut_conifers, first_age, young, mature,
-            p.height_rate_conifer[i], p.height_shape_conifer[i], p.stem_carbon_exponent[i],
-        )  # fmt: skip
+            s.conifer_stems,
+            i,
+            cut_conifers,
+            first_age,
+            young,
+            mature,
+            p.height_rate_conifer[i],
+            p.height_shape_conifer[i],
+            p.stem_carbon_exponent[i],
+        )
         share_deciduous = cut_oldest(
-            s.deciduous_stems, i, cut - cut_conifers, first_age, young, mature,
-            p.height_rate_deciduous[i], p.height_shape_deciduous[i], p.stem_carbon_exponent[i],
-        )  # fmt: skip
+            s.deciduous_stems,
+            i,
+            cut - cut_conifers,
+            first_age,
+            young,
+            mature,
+            p.height_rate_deciduous[i],
+            p.height_shape_deciduous[i],
+            p.stem_carbon_exponent[i],
+        )
         harvest = share_conifer * s.conifer_biomass[i] + share_deciduous * s.deciduous_biomass[i]
         s.conifer_biomass[i] -= share_conifer * s.conifer_biomass[i]
         s.deciduous_biomass[i] -= share_deciduous * s.deciduous_biomass[i]
@@ -217,9 +232,15 @@ def decay(b, i):
     """The organic layer moves toward its canopy's equilibrium; products decay if they have a half-life."""
     s, p, w, r = b.s, b.p, b.w, b.r
     s.organic_depth[i] = organic_layer(
-        s.organic_depth[i], w.cover_conifer[i], w.cover_deciduous[i], p.organic_depth_conifer_m[i],
-        p.organic_depth_deciduous_m[i], p.organic_depth_open_m[i], p.organic_growth_m_yr[i], p.organic_loss_years[i],
-    )  # fmt: skip
+        s.organic_depth[i],
+        w.cover_conifer[i],
+        w.cover_deciduous[i],
+        p.organic_depth_conifer_m[i],
+        p.organic_depth_deciduous_m[i],
+        p.organic_depth_open_m[i],
+        p.organic_growth_m_yr[i],
+        p.organic_loss_years[i],
+    )
     lost = s.products[i] * w.products_decay[i]
     s.products[i] -= lost
     r.hwp_decay_kgc_m2[i] = lost

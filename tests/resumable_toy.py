@@ -27,6 +27,7 @@ class ResumableToyEnv(ToyEnv):
 
     def action_masks(self):
         if self._fails("mask"):
+
             class NoPickle(Exception):
                 pass
 

@@ -21,10 +21,15 @@ def archived(tmp_path):
 
 def test_folders_are_named_as_the_runs_are(archived):
     names = {str(path.parent.relative_to(archived)) for path in archived.rglob("config.json")}
-    assert names == {"ppo_curriculum/boreal-generalist-v0-vectorization=lockstep/seed1",
-                     "zero_change/boreal-generalist-v0/seed1"}
-    config = {"script": "a", "arguments": {"env_id": "my_module:toy/one-v0", "seed": 3},
-              "not_default": {"eval_weights": [0.0, 0.5], "site_seed": 7}}
+    assert names == {
+        "ppo_curriculum/boreal-generalist-v0-vectorization=lockstep/seed1",
+        "zero_change/boreal-generalist-v0/seed1",
+    }
+    config = {
+        "script": "a",
+        "arguments": {"env_id": "my_module:toy/one-v0", "seed": 3},
+        "not_default": {"eval_weights": [0.0, 0.5], "site_seed": 7},
+    }
     assert archive.folder_of(config, archived) == archived / "a" / "toy-one-v0-eval_weights=0,0.5-site_seed=7" / "seed3"
 
 

@@ -130,8 +130,10 @@ def test_one_stand_alone_equals_lockstep_to_the_bit(lockstep, seed):
 def test_night_at_one_latitude_is_the_same_beside_day_at_another(overcast):
     """Under a warm overcast sky a canopy gains longwave at night; it may not transpire because others have sun."""
     constants = {name: 1.0 for name in sim.CONSTANTS if name.startswith("cloud_")} if overcast else None
-    sites = [sim.middle_site({"latitude_deg": float(deg), "mean_annual_temperature_c": 0.0, "diurnal_amplitude_c": 8.0})
-             for deg in np.linspace(45.0, 72.0, 16)]  # fmt: skip
+    sites = [
+        sim.middle_site({"latitude_deg": float(deg), "mean_annual_temperature_c": 0.0, "diurnal_amplitude_c": 8.0})
+        for deg in np.linspace(45.0, 72.0, 16)
+    ]
     together = sim.Stands(16, time_step_minutes=60, constants=constants)
     together.start(np.arange(16), sites, [sim.episode_seeds(k) for k in range(16)])
     record = together.step(np.full(16, 12))

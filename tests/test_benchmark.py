@@ -39,8 +39,11 @@ def test_every_section_has_positive_figures_in_its_units():
     assert (first.ratio[first.unit != "% not physics"] == 1.0).all()
 
     training = table[(table.section == "training") & (table.unit == "ms per step")].set_index("what")["median"]
-    assert set(training.index) == {f"{kind} stands: {part}" for kind in ("async, 8", "lockstep, 32")
-                                   for part in ("physics", "plumbing", "policy", "update")}  # fmt: skip
+    assert set(training.index) == {
+        f"{kind} stands: {part}"
+        for kind in ("async, 8", "lockstep, 32")
+        for part in ("physics", "plumbing", "policy", "update")
+    }
 
 
 def test_the_script_writes_its_tables(tmp_path, capsys):
@@ -61,9 +64,11 @@ def test_a_bad_argument_is_refused(arguments, tmp_path):
 
 def test_sections_that_are_not_measured_keep_their_rows(tmp_path):
     path = tmp_path / "benchmark.csv"
-    rows = [("episode", "a", "s", 1.0, 1.0, 1.0, 1.0, 1, "5-7 s"),
-            ("stands", "b", "ns per stand", 2.0, 2.0, 2.0, np.nan, 1, ""),
-            ("threads", "c", "stand-years per s", 3.0, 3.0, 3.0, 1.0, 1, "")]  # fmt: skip
+    rows = [
+        ("episode", "a", "s", 1.0, 1.0, 1.0, 1.0, 1, "5-7 s"),
+        ("stands", "b", "ns per stand", 2.0, 2.0, 2.0, np.nan, 1, ""),
+        ("threads", "c", "stand-years per s", 3.0, 3.0, 3.0, 1.0, 1, ""),
+    ]
     pd.DataFrame(rows, columns=benchmark.COLUMNS).to_csv(path, index=False)
     new = pd.DataFrame([("stands", "d", "ns per stand", 4.0, 4.0, 4.0, 1.0, 1, "")], columns=benchmark.COLUMNS)
     both = benchmark.with_earlier(new, path)

@@ -50,16 +50,26 @@ def found(claim, runs, studies=None):
 
 # ------------------------------------------------------------------------------------------- rules
 
+
 def seeds(value, low, high, count=5):
     return Number(value, low, high, SEEDS, count)
 
 
-@pytest.mark.parametrize(("number", "least", "holds"), [
-    (seeds(1, 0.5, 2), None, True), (seeds(-1, -2, -0.5), None, False), (seeds(0.2, -1, 1), None, None),
-    (seeds(0.2, -1, 1), 3.8, False), (seeds(1, 0.5, 2), 3.8, False), (seeds(0.2, -1, 5), 3.8, None),
-    (seeds(1, 0.5, 2, count=2), 3.8, None),
-    (Number(1, over=SEEDS, count=1), None, None), (Number(1), None, True), (Number(np.nan), None, None),
-])
+@pytest.mark.parametrize(
+    ("number", "least", "holds"),
+    [
+        (seeds(1, 0.5, 2), None, True),
+        (seeds(-1, -2, -0.5), None, False),
+        (seeds(0.2, -1, 1), None, None),
+        (seeds(0.2, -1, 1), 3.8, False),
+        (seeds(1, 0.5, 2), 3.8, False),
+        (seeds(0.2, -1, 5), 3.8, None),
+        (seeds(1, 0.5, 2, count=2), 3.8, None),
+        (Number(1, over=SEEDS, count=1), None, None),
+        (Number(1), None, True),
+        (Number(np.nan), None, None),
+    ],
+)
 def test_signs(number, least, holds):
     assert above(number, least=least).holds is holds
     assert below(number.mirrored, least=least).holds is holds
@@ -93,6 +103,7 @@ def test_numbers_as_text():
 
 # ------------------------------------------------------------------------------- the paper by itself
 
+
 @pytest.mark.parametrize("points", [2, 3, 4])
 def test_chance_of_keeping_monotonicity(points):
     orders = [np.diff(order) > 0 for order in permutations(range(points))]
@@ -111,8 +122,12 @@ def test_at_most_half_violated_by_chance():
 def test_the_papers_tables(tmp_path):
     verdicts = {claim: found(claim, tmp_path)[0].verdict for claim in paper_itself.CLAIMS}
     contradict = {claim for claim, verdict in verdicts.items() if verdict == CONTRADICTS}
-    assert contradict == {paper_itself.hypervolumes, paper_itself.spreads,
-                          paper_itself.strategies, paper_itself.gated_warming}
+    assert contradict == {
+        paper_itself.hypervolumes,
+        paper_itself.spreads,
+        paper_itself.strategies,
+        paper_itself.gated_warming,
+    }
     assert verdicts[paper_itself.heuristic_hypervolumes] == UNTESTABLE
     assert verdicts[paper_itself.scalarised] == verdicts[paper_itself.violations] == REPRODUCED
     assert found(paper_itself.hypervolumes, tmp_path)[1]["hypervolume, Curriculum PPO"] == "120 from its details"
@@ -131,6 +146,7 @@ def test_actions_and_parameters(tmp_path):
 
 
 # ------------------------------------------------------------------------------------- runs, by hand
+
 
 def test_one_seed_is_no_verdict():
     finding, ours = found(performance.CLAIMS[0], TINY_RUNS)
@@ -188,15 +204,33 @@ def test_heuristics_are_paired_over_episodes(tmp_path):
 
 def test_what_is_learnt_is_measured_from_random_actions(tmp_path):
     studies = tmp_path / "studies"
-    rows = [{"env_id": GENERALIST, "action": action, "episode": k, "seed": k, "carbon_return": 1.0 + (action == 20) + k,
-             "thaw_return": -1.0 + k} for action in PLANTING for k in (0, 1)]
+    rows = [
+        {
+            "env_id": GENERALIST,
+            "action": action,
+            "episode": k,
+            "seed": k,
+            "carbon_return": 1.0 + (action == 20) + k,
+            "thaw_return": -1.0 + k,
+        }
+        for action in PLANTING
+        for k in (0, 1)
+    ]
     stored.write(studies / "constant_plans.csv", pd.DataFrame(rows), {})
     runs = tmp_path / "runs"
     write_run(runs / "random", "random_valid", carbon=(0.5,) * 3, thaw=(-3.5,) * 3)
     for seed in range(1, 6):
         for weight in experiments.WEIGHTS:
-            write_run(runs / f"{seed}-{weight}", "eupg_fixed_lambda", seed, (1.5,), (-3.0,), (weight,),
-                      preference=weight, vectorization="lockstep")
+            write_run(
+                runs / f"{seed}-{weight}",
+                "eupg_fixed_lambda",
+                seed,
+                (1.5,),
+                (-3.0,),
+                (weight,),
+                preference=weight,
+                vectorization="lockstep",
+            )
     finding, ours = found(asymmetry.carbon_is_learnt, runs, studies)
     # random actions: 0.5 on average; the best plan for carbon: 2.5; the agent: 1.5
     assert ours["carbon return less that of random actions, same sites"].value == pytest.approx(1)
@@ -210,14 +244,26 @@ def test_what_is_learnt_is_measured_from_random_actions(tmp_path):
 
 def test_controls_are_told_apart_by_their_flags(tmp_path):
     for seed in range(1, 6):
-        for name, script, returns, flags in (("main", "ppo_curriculum", 2, {}),
-                                             ("coin", "ppo_curriculum", 5, {"selector": "coin"}),
-                                             ("half", "ppo_gated", 1, {"total_timesteps": 150_000}),
-                                             ("double", "ppo_gated", 3, {"total_timesteps": 600_000})):
-            write_run(tmp_path / f"{name}{seed}", script, seed, (returns,) * 3, (returns,) * 3,
-                      vectorization="lockstep", **flags)
-    wanted = {curriculum.same_training: (1, REPRODUCED), curriculum.coin: (-3, NOT_REPRODUCED),
-              curriculum.more_data: (-1, NOT_REPRODUCED)}
+        for name, script, returns, flags in (
+            ("main", "ppo_curriculum", 2, {}),
+            ("coin", "ppo_curriculum", 5, {"selector": "coin"}),
+            ("half", "ppo_gated", 1, {"total_timesteps": 150_000}),
+            ("double", "ppo_gated", 3, {"total_timesteps": 600_000}),
+        ):
+            write_run(
+                tmp_path / f"{name}{seed}",
+                script,
+                seed,
+                (returns,) * 3,
+                (returns,) * 3,
+                vectorization="lockstep",
+                **flags,
+            )
+    wanted = {
+        curriculum.same_training: (1, REPRODUCED),
+        curriculum.coin: (-3, NOT_REPRODUCED),
+        curriculum.more_data: (-1, NOT_REPRODUCED),
+    }
     for claim, (apart, verdict) in wanted.items():
         finding, ours = found(claim, tmp_path)
         assert (ours["difference, paired by seed"].value, finding.verdict) == (apart, verdict)
@@ -227,12 +273,16 @@ def test_controls_are_told_apart_by_their_flags(tmp_path):
 
 def test_time_from_the_log_and_the_benchmark(five_seeds):
     (five_seeds / "studies").mkdir()
-    benchmark = pd.DataFrame([("episode", "50-year episode, 1 stand", 0.3, 0.2, 0.4, 1.0, 7),
-                              ("episode", "50-year episode, 16 stands in lockstep, each", 0.05, 0.04, 0.06, 1.0, 7),
-                              ("episode", "50-year episode, python backend", 134.0, 130.0, 140.0, 400.0, 7),
-                              ("threads", "1 thread, 64 stands", 9.0, 9.0, 9.0, 1.0, 7),
-                              ("threads", "16 threads, 64 stands", 90.0, 90.0, 90.0, 10.0, 7)],
-                             columns=["section", "what", "median", "low", "high", "ratio", "repeats"])
+    benchmark = pd.DataFrame(
+        [
+            ("episode", "50-year episode, 1 stand", 0.3, 0.2, 0.4, 1.0, 7),
+            ("episode", "50-year episode, 16 stands in lockstep, each", 0.05, 0.04, 0.06, 1.0, 7),
+            ("episode", "50-year episode, python backend", 134.0, 130.0, 140.0, 400.0, 7),
+            ("threads", "1 thread, 64 stands", 9.0, 9.0, 9.0, 1.0, 7),
+            ("threads", "16 threads, 64 stands", 90.0, 90.0, 90.0, 10.0, 7),
+        ],
+        columns=["section", "what", "median", "low", "high", "ratio", "repeats"],
+    )
     benchmark.to_csv(five_seeds / "benchmark.csv", index=False)
     studies = five_seeds / "studies"
     finding, ours = found(speed.episode, five_seeds, studies)
@@ -247,16 +297,33 @@ def test_time_from_the_log_and_the_benchmark(five_seeds):
 
 # ---------------------------------------------------------------------------------- all of it
 
+
 def training_episodes(steps, seed):
     generator = np.random.default_rng(seed)
     number = 60
-    table = pd.DataFrame({"global_step": np.linspace(steps / number, steps, number).astype(int), "episode": 1, "env": 0,
-                          "site_seed": generator.integers(1000, size=number), "preference": 0.5})
-    for name in ("carbon_return", "thaw_return", "scalarized_return", "final_density", "mean_density",
-                 "final_conifer_fraction", "mean_conifer_fraction", "score"):
+    table = pd.DataFrame(
+        {
+            "global_step": np.linspace(steps / number, steps, number).astype(int),
+            "episode": 1,
+            "env": 0,
+            "site_seed": generator.integers(1000, size=number),
+            "preference": 0.5,
+        }
+    )
+    for name in (
+        "carbon_return",
+        "thaw_return",
+        "scalarized_return",
+        "final_density",
+        "mean_density",
+        "final_conifer_fraction",
+        "mean_conifer_fraction",
+        "score",
+    ):
         table[name] = generator.normal(size=number)
-    return table.assign(threshold=0.5 + 0.001 * generator.integers(3, size=number),
-                        selected=generator.integers(2, size=number))
+    return table.assign(
+        threshold=0.5 + 0.001 * generator.integers(3, size=number), selected=generator.integers(2, size=number)
+    )
 
 
 def write_everything(folder, jobs):
@@ -269,26 +336,37 @@ def write_everything(folder, jobs):
         weights = (flags["preference"],) if "preference" in flags else (0.0, 0.5, 1.0)
         returns = generator.normal(size=(2, len(weights)))
         run = folder / "runs" / str(number)
-        write_run(run, job.script, job.flags.get("seed", 1), *returns, weights=weights,
-                  **{"env_id": job.env_id} | flags)
+        write_run(
+            run, job.script, job.flags.get("seed", 1), *returns, weights=weights, **{"env_id": job.env_id} | flags
+        )
         if job.trains:
             training_episodes(flags.get("total_timesteps", 300_000), number).to_csv(run / "episodes.csv", index=False)
     studies = folder / "studies"
     names = ["carbon_return", "thaw_return", "thaw_clipped_years", *MEANS]
     cases = pd.DataFrame([(pair, off) for pair in PAIRS for off in OFF] * 4, columns=["pair", "off"])
-    pairs = pd.DataFrame(generator.normal(size=(len(cases), 2 * len(names))),
-                         columns=[f"{side}_{name}" for side in ("lower", "upper") for name in names])
+    pairs = pd.DataFrame(
+        generator.normal(size=(len(cases), 2 * len(names))),
+        columns=[f"{side}_{name}" for side in ("lower", "upper") for name in names],
+    )
     stored.write(studies / "mechanism_pairs.csv", cases.join(pairs), {})
-    of_sites = pd.DataFrame([(site, action, *generator.normal(size=2)) for site in experiments.SITE_SEEDS
-                             for action in range(25)],
-                            columns=["site_seed", "action", "carbon_return", "thaw_return"])
+    of_sites = pd.DataFrame(
+        [(site, action, *generator.normal(size=2)) for site in experiments.SITE_SEEDS for action in range(25)],
+        columns=["site_seed", "action", "carbon_return", "thaw_return"],
+    )
     stored.write(studies / "constant_plans_of_sites.csv", of_sites, {})
-    plans = pd.DataFrame([(env, action, seed, *generator.normal(size=2)) for env in (GENERALIST, "boreal-balanced-v0")
-                          for action in PLANTING for seed in (0, 1)],
-                         columns=["env_id", "action", "seed", "carbon_return", "thaw_return"])
+    plans = pd.DataFrame(
+        [
+            (env, action, seed, *generator.normal(size=2))
+            for env in (GENERALIST, "boreal-balanced-v0")
+            for action in PLANTING
+            for seed in (0, 1)
+        ],
+        columns=["env_id", "action", "seed", "carbon_return", "thaw_return"],
+    )
     stored.write(studies / "constant_plans.csv", plans, {})
-    sites = pd.DataFrame(generator.normal(size=(12, 4)),
-                         columns=["latitude_deg", "warming_mj_m2", "cooling_mj_m2", "thaw_return"])
+    sites = pd.DataFrame(
+        generator.normal(size=(12, 4)), columns=["latitude_deg", "warming_mj_m2", "cooling_mj_m2", "thaw_return"]
+    )
     stored.write(studies / "site_warming.csv", sites.assign(seed=[1, 1, 2, 2] * 3, selected=[0, 1] * 6), {})
     for name in ("fronts", "variance"):
         shutil.copytree(experiments.ROOT / "results" / name, folder / name)
@@ -305,7 +383,8 @@ def test_the_jobs_fill_every_claim(tmp_path):
     every = [claim for theme in claims.THEMES for claim in theme.CLAIMS]
     findings = {claim: claims.judge(claim, evidence) for claim in every}
     assert {claim.statement for claim, one in findings.items() if one.verdict == NO_RUNS} == {
-        claim.statement for claim in BENCHMARKED}  # no benchmark was run
+        claim.statement for claim in BENCHMARKED
+    }  # no benchmark was run
     assert all(one.rows for one in findings.values() if one.verdict != NO_RUNS)
     assert not [row for one in findings.values() for row in one.rows if row.ours == "no runs yet"]
 

@@ -96,9 +96,18 @@ def test_no_stock_is_negative(run):
         for name in NEVER_NEGATIVE:
             assert year.after[:, STATE_NAMES.index(name)].min() >= 0.0, name
         assert year.after[:, len(STATE_NAMES) :].min() >= 0.0
-        for name in ("swe_mm", "canopy_snow_mm", "soil_water_mm", "runoff_mm", "lai", "organic_layer_m", "gpp_kgc_m2",
-                     "autotrophic_respiration_kgc_m2", "heterotrophic_respiration_kgc_m2",
-                     "precipitation_mm"):  # fmt: skip
+        for name in (
+            "swe_mm",
+            "canopy_snow_mm",
+            "soil_water_mm",
+            "runoff_mm",
+            "lai",
+            "organic_layer_m",
+            "gpp_kgc_m2",
+            "autotrophic_respiration_kgc_m2",
+            "heterotrophic_respiration_kgc_m2",
+            "precipitation_mm",
+        ):
             assert getattr(year.daily, name).min() >= 0.0, name
 
 
@@ -106,9 +115,13 @@ def test_carbon_of_the_year(run):
     for year in run:
         r = year.record
         crossed = (
-            r.gpp_kgc_m2 - r.autotrophic_respiration_kgc_m2 - r.heterotrophic_respiration_kgc_m2
-            - r.fire_loss_kgc_m2 - r.harvest_emission_kgc_m2 - r.hwp_decay_kgc_m2
-        )  # fmt: skip
+            r.gpp_kgc_m2
+            - r.autotrophic_respiration_kgc_m2
+            - r.heterotrophic_respiration_kgc_m2
+            - r.fire_loss_kgc_m2
+            - r.harvest_emission_kgc_m2
+            - r.hwp_decay_kgc_m2
+        )
         change = store(year.after, HEAVY_STORES) - store(year.before, HEAVY_STORES)
         np.testing.assert_allclose(r.net_carbon_change_kgc_m2, crossed, rtol=0, atol=1e-10)
         np.testing.assert_allclose(change, crossed, rtol=0, atol=1e-10)
@@ -196,10 +209,19 @@ def test_heat_of_the_deep_soil(run):
 
 @pytest.mark.parametrize(
     "name",
-    ["gpp_kgc_m2", "autotrophic_respiration_kgc_m2", "heterotrophic_respiration_kgc_m2", "precipitation_mm",
-     "evapotranspiration_mm", "runoff_mm", "shortwave_mj_m2", "net_radiation_mj_m2", "sensible_heat_mj_m2",
-     "latent_heat_mj_m2"],
-)  # fmt: skip
+    [
+        "gpp_kgc_m2",
+        "autotrophic_respiration_kgc_m2",
+        "heterotrophic_respiration_kgc_m2",
+        "precipitation_mm",
+        "evapotranspiration_mm",
+        "runoff_mm",
+        "shortwave_mj_m2",
+        "net_radiation_mj_m2",
+        "sensible_heat_mj_m2",
+        "latent_heat_mj_m2",
+    ],
+)
 def test_days_add_up_to_the_year(run, name):
     for year in run:
         np.testing.assert_allclose(getattr(year.daily, name).sum(axis=1), year.record[name], rtol=1e-9, atol=1e-9)
@@ -249,9 +271,11 @@ def test_fire_moves_carbon_between_named_fluxes_only():
     previous = table.organic_layer_m.shift()
     assert (table.organic_layer_m < 0.7 * previous)[burnt.index[burnt.index > 0]].all()
     crossed = (
-        table.gpp_kgc_m2 - table.autotrophic_respiration_kgc_m2 - table.heterotrophic_respiration_kgc_m2
+        table.gpp_kgc_m2
+        - table.autotrophic_respiration_kgc_m2
+        - table.heterotrophic_respiration_kgc_m2
         - table.fire_loss_kgc_m2
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(table.net_carbon_change_kgc_m2, crossed, atol=1e-10)
 
 
@@ -274,8 +298,13 @@ def test_snow_that_sublimates_away_within_a_step_does_not_heat_the_ground():
 
 def test_a_trace_of_snow_does_not_pump_heat_into_the_soil():
     """Sleet in a humid gale: the ground is held at 0 degC only as long as there is snow to melt."""
-    site = {"relative_humidity": 1.0, "wind_speed_m_s": 15.0, "soil_roughness_m": 0.1, "shoulder_rain_prob": 1.0,
-            "min_diurnal_amplitude_c": 5.0}  # fmt: skip
+    site = {
+        "relative_humidity": 1.0,
+        "wind_speed_m_s": 15.0,
+        "soil_roughness_m": 0.1,
+        "shoulder_rain_prob": 1.0,
+        "min_diurnal_amplitude_c": 5.0,
+    }
     daily = sim.simulate(site, 12, seed=1, years=2, time_step_minutes=30, output="daily")
     assert daily.surface_soil_temperature_c.max() < daily.air_temperature_c.max() + 5.0
     assert daily.ground_temperature_c.max() < daily.air_temperature_c.max() + 15.0
@@ -291,22 +320,62 @@ def test_all_parameters_at_one_limit(corner):
 
 HARD_SITES = {
     "hot wet canopy in still air": (
-        {"mean_annual_temperature_c": 10.0, "seasonal_amplitude_c": 35.0, "daily_noise_std_c": 10.0,
-         "wind_speed_m_s": 0.3, "summer_rain_prob": 1.0, "canopy_roughness_m": 0.1}, [15, 4, 9], 45),
+        {
+            "mean_annual_temperature_c": 10.0,
+            "seasonal_amplitude_c": 35.0,
+            "daily_noise_std_c": 10.0,
+            "wind_speed_m_s": 0.3,
+            "summer_rain_prob": 1.0,
+            "canopy_roughness_m": 0.1,
+        },
+        [15, 4, 9],
+        45,
+    ),
     "cloudbursts in a dry gale": (
-        {"mean_annual_temperature_c": 10.0, "seasonal_amplitude_c": 5.0, "diurnal_amplitude_c": 15.0,
-         "relative_humidity": 0.2, "wind_speed_m_s": 15.0, "summer_rain_mm_day": 60.0,
-         "summer_precip_temp_sensitivity": 0.2, "summer_precip_base_temp_c": 0.0, "rain_diurnal_sensitivity": 0.0,
-         "soil_roughness_m": 0.1}, [2, 16, 2], 7140),
+        {
+            "mean_annual_temperature_c": 10.0,
+            "seasonal_amplitude_c": 5.0,
+            "diurnal_amplitude_c": 15.0,
+            "relative_humidity": 0.2,
+            "wind_speed_m_s": 15.0,
+            "summer_rain_mm_day": 60.0,
+            "summer_precip_temp_sensitivity": 0.2,
+            "summer_precip_base_temp_c": 0.0,
+            "rain_diurnal_sensitivity": 0.0,
+            "soil_roughness_m": 0.1,
+        },
+        [2, 16, 2],
+        7140,
+    ),
     "dark canopy in still air": (
-        {"diurnal_amplitude_c": 15.0, "peak_diurnal_hour": 0.0, "wind_speed_m_s": 0.3,
-         "summer_precip_temp_sensitivity": 0.2, "summer_precip_base_temp_c": 0.0, "max_diurnal_reduction": 0.0,
-         "canopy_roughness_m": 0.1, "albedo_conifer": 0.03, "albedo_deciduous": 0.05}, [13, 2, 21], 21017),
+        {
+            "diurnal_amplitude_c": 15.0,
+            "peak_diurnal_hour": 0.0,
+            "wind_speed_m_s": 0.3,
+            "summer_precip_temp_sensitivity": 0.2,
+            "summer_precip_base_temp_c": 0.0,
+            "max_diurnal_reduction": 0.0,
+            "canopy_roughness_m": 0.1,
+            "albedo_conifer": 0.03,
+            "albedo_deciduous": 0.05,
+        },
+        [13, 2, 21],
+        21017,
+    ),
     "tropical rain": (
-        {"mean_annual_temperature_c": 10.0, "seasonal_amplitude_c": 35.0, "daily_noise_std_c": 10.0,
-         "summer_rain_prob": 1.0, "summer_rain_mm_day": 60.0, "summer_precip_temp_sensitivity": 0.2,
-         "summer_precip_base_temp_c": 0.0}, [12, 12, 12], 1),
-}  # fmt: skip
+        {
+            "mean_annual_temperature_c": 10.0,
+            "seasonal_amplitude_c": 35.0,
+            "daily_noise_std_c": 10.0,
+            "summer_rain_prob": 1.0,
+            "summer_rain_mm_day": 60.0,
+            "summer_precip_temp_sensitivity": 0.2,
+            "summer_precip_base_temp_c": 0.0,
+        },
+        [12, 12, 12],
+        1,
+    ),
+}
 
 
 @pytest.mark.parametrize("minutes", [30, 120])

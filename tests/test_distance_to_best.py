@@ -22,15 +22,30 @@ WEATHERS = (4, 5)
 
 def plans_of(plans: dict) -> pd.DataFrame:
     """(kind, actions) -> mean (carbon, thaw), half a unit more or less on either weather; zero change has -1, -2."""
-    rows = [{"kind": kind, "actions": actions, "weather": weather, "carbon_return": carbon + sign / 2 - 1,
-             "thaw_return": thaw + sign / 2 - 2}
-            for (kind, actions), (carbon, thaw) in plans.items()
-            for weather, sign in zip(WEATHERS, (-1, 1), strict=True)]  # fmt: skip
+    rows = [
+        {
+            "kind": kind,
+            "actions": actions,
+            "weather": weather,
+            "carbon_return": carbon + sign / 2 - 1,
+            "thaw_return": thaw + sign / 2 - 2,
+        }
+        for (kind, actions), (carbon, thaw) in plans.items()
+        for weather, sign in zip(WEATHERS, (-1, 1), strict=True)
+    ]
     return pd.DataFrame(rows)
 
 
-HAND = plans_of({("constant", "12 12"): (0, 0), ("constant", "24 24"): (1, 2), ("constant", "20 20"): (2, -1),
-                 ("front", "24 20"): (2, 1), ("front", "24 24"): (0.5, 4), ("front", "20 12"): (3, -2)})  # fmt: skip
+HAND = plans_of(
+    {
+        ("constant", "12 12"): (0, 0),
+        ("constant", "24 24"): (1, 2),
+        ("constant", "20 20"): (2, -1),
+        ("front", "24 20"): (2, 1),
+        ("front", "24 24"): (0.5, 4),
+        ("front", "20 12"): (3, -2),
+    }
+)
 
 
 @pytest.fixture
@@ -74,8 +89,12 @@ def test_the_best_constant_plans():
 
 def test_where_nothing_can_be_gained_there_is_no_share():
     flat = distance_to_best.with_gains(plans_of({("constant", "12 12"): (0, 0), ("front", "24 12"): (1, 0)}))
-    row = dict.fromkeys(distance_to_best.KEY, "") | {"site": 7, "carbon_gain": 0.5, "thaw_gain": 0.0,
-                                                     "scalarized_gain_error": 0.1}  # fmt: skip
+    row = dict.fromkeys(distance_to_best.KEY, "") | {
+        "site": 7,
+        "carbon_gain": 0.5,
+        "thaw_gain": 0.0,
+        "scalarized_gain_error": 0.1,
+    }
     table = pd.DataFrame([row | {"weight": 0.0, "scalarized_gain": 0.0}, row | {"weight": 1.0, "scalarized_gain": 0.5}])
     share = distance_to_best.complete(table, {7: flat}).set_index("weight").share
     assert np.isnan(share[0.0]) and share[1.0] == 0.5
@@ -89,8 +108,9 @@ def test_agents_meet_the_episodes_of_the_plans():
     cases = [(SITES[0], 4), (SITES[1], 5)]
     envs = distance_to_best.OnSites(cases, years=2)
     observations, _ = envs.reset(seed=[1, 2], options={"preference": np.array([0.25, 0.75])})
-    played = open_loop.play([sim.sample_site(site) for site, _ in cases], [open_loop.seeds(*case) for case in cases],
-                            [[24, 24], [20, 20]])  # fmt: skip
+    played = open_loop.play(
+        [sim.sample_site(site) for site, _ in cases], [open_loop.seeds(*case) for case in cases], [[24, 24], [20, 20]]
+    )
     names = list(envs.observation_names)
     assert observations[:, 0].tolist() == [0.25, 0.75]
     density = played.start["density_stems_ha"]
@@ -120,10 +140,16 @@ def test_a_strategy_plays_once_for_all_weights(monkeypatch):
     np.testing.assert_allclose(of_site.scalarized_gain, returns.mean(axis=0)[::-1], atol=2e-6)
 
 
-@pytest.mark.parametrize("script, arguments", [
-    ("ppo_gated", {}), ("ppo_gated", {"per_objective_advantages": True, "hide_site": True}), ("ppo_curriculum", {}),
-    ("eupg_var_lambda", {}), ("eupg_fixed_lambda", {}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "script, arguments",
+    [
+        ("ppo_gated", {}),
+        ("ppo_gated", {"per_objective_advantages": True, "hide_site": True}),
+        ("ppo_curriculum", {}),
+        ("eupg_var_lambda", {}),
+        ("eupg_fixed_lambda", {}),
+    ],
+)
 def test_an_agent_is_its_scripts_own(script, arguments, tmp_path):
     module = importlib.import_module(f"cleanrl_style.{script}")
     size = 43 if "hide_site" in arguments else 105
@@ -153,9 +179,12 @@ def calls(monkeypatch):
 
     def judge(policy, kwargs, plans, weights, learnt, played):
         methods.append(policy)
-        rows = [{"site": site, "policy": kind, "weight": weight, **distance_to_best.means_of(np.ones((2, 2)), weight)}
-                for site in plans for kind in (("greedy", "sampled") if learnt else ("sampled",))
-                for weight in weights]  # fmt: skip
+        rows = [
+            {"site": site, "policy": kind, "weight": weight, **distance_to_best.means_of(np.ones((2, 2)), weight)}
+            for site in plans
+            for kind in (("greedy", "sampled") if learnt else ("sampled",))
+            for weight in weights
+        ]
         return pd.DataFrame(rows)
 
     monkeypatch.setattr(distance_to_best, "judge", judge)

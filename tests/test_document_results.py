@@ -50,7 +50,9 @@ def test_rows_are_those_of_the_runs(tmp_path):
 def test_all_methods_and_the_heuristics(tmp_path):
     results = Results((TINY_RUNS,), experiments.jobs(), tmp_path)
     assert [row.split(" | ")[0] for row in document_results.section(results, "all").splitlines()[2:]] == [
-        "| Curriculum PPO", "| Zero change"]  # fmt: skip
+        "| Curriculum PPO",
+        "| Zero change",
+    ]
     assert len(document_results.section(results, "heuristics").splitlines()) == 3
     assert document_results.section(results, "eupg_var_lambda") == "No runs yet.\n"
 

@@ -70,9 +70,7 @@ def test_trees_show_density_and_species(env):
 
 def test_burnt_and_empty_stands_can_be_drawn():
     always = {"fire_base_probability": 0.05, "fire_drought_threshold": 0.0}
-    env = boreal_env.BorealEnv(
-        render_mode="rgb_array", parameter_overrides=always, record_years=True, years=10
-    )
+    env = boreal_env.BorealEnv(render_mode="rgb_array", parameter_overrides=always, record_years=True, years=10)
     env.reset(seed=2)
     pictures = [env.render()]
     terminated = False

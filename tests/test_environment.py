@@ -209,8 +209,13 @@ def test_memory_is_bounded_over_any_number_of_episodes():
 @pytest.mark.parametrize("action", [0, 4, 12, 20, 24])
 @pytest.mark.parametrize("extreme", [False, True])
 def test_observations_and_rewards_stay_in_their_spaces(action, extreme):
-    ranges = {"density_stems_ha": (0.0, 10000.0), "biomass_kgc_m2": (0.0, 60.0), "soil_kgc_m2": (0.0, 100.0),
-              "conifer_fraction": (0.0, 1.0), "oldest_age_years": (1.0, 200.0)}  # fmt: skip
+    ranges = {
+        "density_stems_ha": (0.0, 10000.0),
+        "biomass_kgc_m2": (0.0, 60.0),
+        "soil_kgc_m2": (0.0, 100.0),
+        "conifer_fraction": (0.0, 1.0),
+        "oldest_age_years": (1.0, 200.0),
+    }
     envs = quick_vector(16, years=12, initial_ranges=ranges if extreme else None)
     observations, _ = envs.reset(seed=action)
     box, rewards_box = envs.single_observation_space, envs.reward_space
@@ -258,10 +263,19 @@ def test_info_is_empty_until_the_end():
     infos = [env.step(12)[4] for _ in range(4)]
     assert infos[:3] == [{}, {}, {}]
     assert set(infos[3]) == {
-        "carbon_return", "thaw_return", "site_seed", "episode_seed", "preference", "final_density", "mean_density",
-        "final_conifer_fraction", "mean_conifer_fraction", "growing_season_days", "latent_heat_mj_m2",
+        "carbon_return",
+        "thaw_return",
+        "site_seed",
+        "episode_seed",
+        "preference",
+        "final_density",
+        "mean_density",
+        "final_conifer_fraction",
+        "mean_conifer_fraction",
+        "growing_season_days",
+        "latent_heat_mj_m2",
         "ground_shortwave_mj_m2",
-    }  # fmt: skip
+    }
     assert all(isinstance(value, (int, float)) for value in infos[3].values())
     assert infos[3].keys() | {"years"} == document_environment.FINAL_INFO.keys()
 
@@ -361,10 +375,13 @@ def test_entries_of_the_climate_and_the_site(episode):
     observations, _, info, _, env = episode
     site = sim.sample_site(info["site_seed"], env._episodes.parameter_overrides)
     climate = [
-        (site["latitude_deg"] - 50.0) / 20.0, (site["mean_annual_temperature_c"] + 10.0) / 20.0,
-        site["seasonal_amplitude_c"] / 30.0, site["growth_start_day"] / 365.0, site["fall_start_day"] / 365.0,
+        (site["latitude_deg"] - 50.0) / 20.0,
+        (site["mean_annual_temperature_c"] + 10.0) / 20.0,
+        site["seasonal_amplitude_c"] / 30.0,
+        site["growth_start_day"] / 365.0,
+        site["fall_start_day"] / 365.0,
         (site["fall_start_day"] - site["growth_start_day"]) / 200.0,
-    ]  # fmt: skip
+    ]
     with (ROOT / "sim" / "site_parameters.csv").open() as file:
         ranges = {row["name"]: (float(row["low"]), float(row["high"])) for row in csv.DictReader(file)}
     scaled = [(site[name] - low) / (high - low) for name, (low, high) in ranges.items()]
@@ -385,8 +402,13 @@ def test_the_page_of_the_environment_is_what_the_code_makes():
 
 
 def test_normalisations_are_written_as_they_are():
-    for name, x, written in (("year", 25.0, "x / 50"), ("latitude", 60.0, "(x - 50) / 20"), ("mix_change", -0.5, "x"),
-                             ("biomass_change", 0.1, "x + 0.5"), ("soil_change", 0.1, "(x + 0.2) / 0.4")):  # fmt: skip
+    for name, x, written in (
+        ("year", 25.0, "x / 50"),
+        ("latitude", 60.0, "(x - 50) / 20"),
+        ("mix_change", -0.5, "x"),
+        ("biomass_change", 0.1, "x + 0.5"),
+        ("soil_change", 0.1, "(x + 0.2) / 0.4"),
+    ):
         entry = OBSERVATION[INDEX[name]]
         assert document_environment.normalisation(entry) == written
         assert eval(written) == pytest.approx((x + entry.shift) / entry.scale)
@@ -400,10 +422,22 @@ def test_age_fractions_of_both_species_sum_to_one(episode):
 
 def test_before_the_first_action_history_shows_an_unchanged_stand(episode):
     first = episode[0][0]
-    neutral = {"year": 0.0, "fire_mortality_1yr": 0.0, "insect_mortality_2yr": 0.0, "drought_index_1yr": 0.0,
-               "biomass_change": 0.5, "soil_change": 0.5, "total_change": 0.5, "natural_mortality": 0.0,
-               "litterfall": 0.0, "thinning_loss": 0.5, "products_stored": 0.0, "density_action": 0.5,
-               "density_change": 0.5, "mix_change": 0.0}  # fmt: skip
+    neutral = {
+        "year": 0.0,
+        "fire_mortality_1yr": 0.0,
+        "insect_mortality_2yr": 0.0,
+        "drought_index_1yr": 0.0,
+        "biomass_change": 0.5,
+        "soil_change": 0.5,
+        "total_change": 0.5,
+        "natural_mortality": 0.0,
+        "litterfall": 0.0,
+        "thinning_loss": 0.5,
+        "products_stored": 0.0,
+        "density_action": 0.5,
+        "density_change": 0.5,
+        "mix_change": 0.0,
+    }
     for name, value in neutral.items():
         assert first[INDEX[name]] == pytest.approx(value), name
     nearest = round(4.0 * first[INDEX["conifer_fraction"]]) / 4.0
@@ -561,8 +595,14 @@ def test_site_specific_mode_is_one_world_whatever_the_seed():
 
 def test_site_specific_mode_is_the_middle_of_every_range_without_noise():
     observation, _ = quick(mode="site_specific").reset(seed=1)
-    middle = {"density": 300.0 / 1500.0, "conifer_fraction": 0.5, "soil": 6.0 / 50.0, "latitude": 10.5 / 20.0,
-              "seasonal_amplitude": 22.5 / 30.0, "growth_start_day": 140.0 / 365.0}  # fmt: skip
+    middle = {
+        "density": 300.0 / 1500.0,
+        "conifer_fraction": 0.5,
+        "soil": 6.0 / 50.0,
+        "latitude": 10.5 / 20.0,
+        "seasonal_amplitude": 22.5 / 30.0,
+        "growth_start_day": 140.0 / 365.0,
+    }
     for name, value in middle.items():
         assert observation[INDEX[name]] == pytest.approx(value, rel=1e-5), name
     daily = sim.simulate({"daily_noise_std_c": 0.0}, 12, seed=0, years=1, time_step_minutes=240, output="daily")
@@ -887,9 +927,14 @@ def test_components_add_up_to_the_carbon_reward(episode):
     _, rewards, info, *_ = episode
     y = info["years"]
     total = (
-        y["carbon_change"] + y["stock_bonus"] + y["product_bonus"] - y["biomass_limit_penalty"]
-        - y["soil_limit_penalty"] - y["density_penalty"] - y["ineffective_penalty"]
-    )  # fmt: skip
+        y["carbon_change"]
+        + y["stock_bonus"]
+        + y["product_bonus"]
+        - y["biomass_limit_penalty"]
+        - y["soil_limit_penalty"]
+        - y["density_penalty"]
+        - y["ineffective_penalty"]
+    )
     np.testing.assert_allclose(y["carbon_reward"] + y["carbon_clipped"], total, atol=1e-12)
     np.testing.assert_allclose(y["carbon_reward"], np.clip(total, -1.0, 1.0), atol=1e-12)
     np.testing.assert_array_equal(rewards[:, 0], y["carbon_reward"].astype(np.float32))
@@ -903,16 +948,30 @@ AMOUNTS = st.floats(0.0, 200.0)
 
 
 @given(
-    change=st.floats(-100.0, 100.0), biomass=AMOUNTS, soil=AMOUNTS, stored=AMOUNTS, density=st.floats(0.0, 4000.0),
-    planted=st.floats(0.0, 100.0), action=st.integers(0, 24), stock_bonus=st.floats(0.0, 2.0),
-    product_bonus=st.floats(0.0, 2.0), scale=st.floats(0.1, 10.0),
-)  # fmt: skip
+    change=st.floats(-100.0, 100.0),
+    biomass=AMOUNTS,
+    soil=AMOUNTS,
+    stored=AMOUNTS,
+    density=st.floats(0.0, 4000.0),
+    planted=st.floats(0.0, 100.0),
+    action=st.integers(0, 24),
+    stock_bonus=st.floats(0.0, 2.0),
+    product_bonus=st.floats(0.0, 2.0),
+    scale=st.floats(0.1, 10.0),
+)
 def test_what_is_rewarded_and_what_is_clipped_add_up(
     change, biomass, soil, stored, density, planted, action, stock_bonus, product_bonus, scale
 ):
-    columns = {"net_carbon_change_kgc_m2": change, "biomass_kgc_m2": biomass, "soil_kgc_m2": soil,
-               "hwp_stored_kgc_m2": stored, "density_after_action": density, "planted_stems_ha": planted,
-               "boundary_warming_mj_m2": biomass, "boundary_cooling_mj_m2": soil}  # fmt: skip
+    columns = {
+        "net_carbon_change_kgc_m2": change,
+        "biomass_kgc_m2": biomass,
+        "soil_kgc_m2": soil,
+        "hwp_stored_kgc_m2": stored,
+        "density_after_action": density,
+        "planted_stems_ha": planted,
+        "boundary_warming_mj_m2": biomass,
+        "boundary_cooling_mj_m2": soil,
+    }
     record = np.zeros((1, len(sim.RECORD_NAMES)))
     for name, value in columns.items():
         record[0, sim.RECORD_NAMES.index(name)] = value
@@ -1024,8 +1083,12 @@ def test_five_actions_without_density_change_are_equal():
 
 
 def test_the_physics_can_be_changed_through_the_environment():
-    for change in ({"constants": {"light_use_conifer": 2.0}}, {"mechanisms": {"moss": False}},
-                   {"hwp_half_life_years": 5}, {"time_step_minutes": 120}):  # fmt: skip
+    for change in (
+        {"constants": {"light_use_conifer": 2.0}},
+        {"mechanisms": {"moss": False}},
+        {"hwp_half_life_years": 5},
+        {"time_step_minutes": 120},
+    ):
         ranges = {"density_stems_ha": (590.0, 600.0)}
         base = play(quick(initial_ranges=ranges), ACTIONS, seed=1)[1]
         assert not np.array_equal(play(quick(initial_ranges=ranges, **change), ACTIONS, seed=1)[1], base), change
@@ -1121,7 +1184,7 @@ def test_an_objective_cannot_rewrite_the_record():
         (lambda: play(quick(objectives=(Objective("bad", lambda year: 1.0),)), [12]), r"objective bad: 1 finite"),
         (lambda: play(quick(objectives=(Objective("bad", lambda year: [NAN]),)), [12]), r"objective bad: .*nan"),
     ],
-)  # fmt: skip
+)
 def test_bad_objectives_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
@@ -1185,7 +1248,7 @@ BAD_ARGUMENTS = {
     "balanced of number": ({"balanced": 1.4}, r"balanced: True or False is allowed, got 1.4"),
     "record of number": ({"record_years": 1}, r"record_years: True or False is allowed, got 1"),
     "render mode": ({"render_mode": "human"}, r"render_mode 'human': allowed are rgb_array"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD_ARGUMENTS.values(), ids=BAD_ARGUMENTS)

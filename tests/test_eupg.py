@@ -119,16 +119,36 @@ def test_evaluation_gives_the_policy_what_training_gives_it():
 
 def learn(script, folder, *arguments):
     """Return of the greedy policy per weight, as the toy gives it that is not centred."""
-    run_script(f"cleanrl_style/{script}.py", "--env-id", "toy_env:toy-centred-v0", "--run-dir", folder, "--num-envs",
-               8, "--eval-episodes", 10, *arguments)
+    run_script(
+        f"cleanrl_style/{script}.py",
+        "--env-id",
+        "toy_env:toy-centred-v0",
+        "--run-dir",
+        folder,
+        "--num-envs",
+        8,
+        "--eval-episodes",
+        10,
+        *arguments,
+    )
     evaluation = pd.read_csv(folder / "evaluation.csv")
     return evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean() + 6
 
 
 @pytest.mark.parametrize("utility", ["total", "future"])
 def test_fixed_lambda_learns_the_toy(tmp_path, utility):
-    returns = learn("eupg_fixed_lambda", tmp_path, "--preference", 1, "--utility", utility, "--learning-rate", 0.005,
-                    "--total-timesteps", 16_000)
+    returns = learn(
+        "eupg_fixed_lambda",
+        tmp_path,
+        "--preference",
+        1,
+        "--utility",
+        utility,
+        "--learning-rate",
+        0.005,
+        "--total-timesteps",
+        16_000,
+    )
     assert returns.index.tolist() == [1.0]
     assert returns[1.0] > 0.95 * optimal_return(1)
     assert (pd.read_csv(tmp_path / "episodes.csv").preference == 1).all()
@@ -137,10 +157,35 @@ def test_fixed_lambda_learns_the_toy(tmp_path, utility):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_variable_lambda_learns_to_follow_the_preference(tmp_path, seed):
     """Without a bonus for entropy the policy settles before it has told the preferences apart."""
-    run_script("cleanrl_style/eupg_var_lambda.py", "--env-id", "toy_env:toy-lockstep-v0", "--seed", seed, "--run-dir",
-               tmp_path, "--vectorization", "lockstep", "--num-envs", 32, "--total-timesteps", 160_000, "--utility",
-               "future", "--baseline", "others", "--ent-coef", 0.05, "--learning-rate", 0.004, "--eval-episodes", 10,
-               "--eval-weights", 0, 0.5, 1)  # fmt: skip
+    run_script(
+        "cleanrl_style/eupg_var_lambda.py",
+        "--env-id",
+        "toy_env:toy-lockstep-v0",
+        "--seed",
+        seed,
+        "--run-dir",
+        tmp_path,
+        "--vectorization",
+        "lockstep",
+        "--num-envs",
+        32,
+        "--total-timesteps",
+        160_000,
+        "--utility",
+        "future",
+        "--baseline",
+        "others",
+        "--ent-coef",
+        0.05,
+        "--learning-rate",
+        0.004,
+        "--eval-episodes",
+        10,
+        "--eval-weights",
+        0,
+        0.5,
+        1,
+    )
     evaluation = pd.read_csv(tmp_path / "evaluation.csv")
     returns = evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean()
     assert all(returns[weight] > 0.9 * optimal_return(weight) for weight in (0.0, 0.5, 1.0))
@@ -163,8 +208,20 @@ def test_the_scripts_differ_in_the_preference_and_nothing_else():
 def test_both_vectorizations_give_the_same_bytes(tmp_path):
     """A batch is eight episodes in either, of the same seeds: only the speed differs."""
     for vectorization in ("async", "lockstep"):
-        run_script("cleanrl_style/eupg_var_lambda.py", "--vectorization", vectorization, "--total-timesteps", 800,
-                   "--eval-episodes", 1, "--eval-weights", 0, 1, "--run-dir", tmp_path / vectorization)  # fmt: skip
+        run_script(
+            "cleanrl_style/eupg_var_lambda.py",
+            "--vectorization",
+            vectorization,
+            "--total-timesteps",
+            800,
+            "--eval-episodes",
+            1,
+            "--eval-weights",
+            0,
+            1,
+            "--run-dir",
+            tmp_path / vectorization,
+        )
     for name in ("episodes", "updates", "evaluation"):
         first, second = ((tmp_path / kind / f"{name}.csv").read_bytes() for kind in ("async", "lockstep"))
         assert first == second and first.count(b"\n") > 2

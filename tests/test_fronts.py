@@ -126,17 +126,26 @@ def test_figure(tmp_path):
     args = draw_conflict.Args(results=tmp_path, path=tmp_path / "conflict.png")
     with pytest.raises(SystemExit, match="python analysis/studies/fronts.py makes it"):
         draw_conflict.main(args)
-    summary = pd.DataFrame([
-        {"site_seed": 7, "off": off, "boundary_above_air_k": 3, "snow_mm_day": 1, **fronts.summarise(hand_case())}
-        for off in (fronts.ALL_ON, "moss")
-    ])  # fmt: skip
+    summary = pd.DataFrame(
+        [
+            {"site_seed": 7, "off": off, "boundary_above_air_k": 3, "snow_mm_day": 1, **fronts.summarise(hand_case())}
+            for off in (fronts.ALL_ON, "moss")
+        ]
+    )
     stored.write(tmp_path / "fronts/summary.csv", summary[:1], {})
     stored.write(fronts.path_of(tmp_path / "fronts", 7, fronts.ALL_ON), hand_case(), {})
     with pytest.raises(SystemExit, match="fronts.py --without-mechanisms makes it"):
         draw_conflict.main(args)
     stored.write(tmp_path / "fronts/mechanisms/summary.csv", summary, {})
-    parts = ("site", "weather", "policy", "site x weather", "site x policy", "weather x policy",
-             "site x weather x policy")  # fmt: skip
+    parts = (
+        "site",
+        "weather",
+        "policy",
+        "site x weather",
+        "site x policy",
+        "weather x policy",
+        "site x weather x policy",
+    )
     components = [
         {"objective": objective, "value": value, "component": part, "share": 1 / 7}
         for objective in open_loop.OBJECTIVES

@@ -40,7 +40,8 @@ def test_without_a_baseline_it_is_the_scripts_gradient(played):
         mean = 0.0
         for which in np.ndindex(2, 2):
             carbon, thaw = gradient_noise.gradients(
-                agent, *(column[which] for column in episodes[:3]), np.moveaxis(weights[which], -1, 0))  # fmt: skip
+                agent, *(column[which] for column in episodes[:3]), np.moveaxis(weights[which], -1, 0)
+            )
             preference = episodes.preferences[which]
             mean = mean + (preference * carbon + (1 - preference) * thaw) / 4
         by_year = [np.moveaxis(column.reshape(4, *column.shape[2:]), 1, 0) for column in episodes[:4]]
@@ -88,10 +89,15 @@ def test_a_gradient_without_signal():
 
 
 def test_the_signal_is_that_of_the_row_with_least_noise():
-    table = pd.DataFrame({
-        "objective": ["carbon", "carbon", "thaw", "thaw"], "signal": [9.0, 2.0, -1.0, 5.0],
-        "signal_low": [-9.0, 1.0, -2.0, 4.0], "signal_high": [99.0, 4.0, 3.0, 6.0], "noise": [80.0, 8.0, 30.0, 60.0],
-    })  # fmt: skip
+    table = pd.DataFrame(
+        {
+            "objective": ["carbon", "carbon", "thaw", "thaw"],
+            "signal": [9.0, 2.0, -1.0, 5.0],
+            "signal_low": [-9.0, 1.0, -2.0, 4.0],
+            "signal_high": [99.0, 4.0, 3.0, 6.0],
+            "noise": [80.0, 8.0, 30.0, 60.0],
+        }
+    )
     rows = gradient_noise.with_episodes(table)
     assert rows.episodes.tolist() == [40, 4, np.inf, np.inf]
     assert rows.episodes_low.tolist() == [20, 2, 10, 20] and rows.episodes_high.tolist() == [80, 8, np.inf, np.inf]

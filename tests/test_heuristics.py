@@ -21,10 +21,23 @@ def test_fixed_actions():
     assert plus_100.policy(observe(0, 1500), None).tolist() == [22, 22]
 
 
-@pytest.mark.parametrize("density, change", [
-    (0, 100), (900, 100), (924, 100), (926, 50), (974, 50), (976, 0), (1000, 0), (1024, 0), (1026, -50),
-    (1074, -50), (1076, -100), (1900, -100),
-])
+@pytest.mark.parametrize(
+    "density, change",
+    [
+        (0, 100),
+        (900, 100),
+        (924, 100),
+        (926, 50),
+        (974, 50),
+        (976, 0),
+        (1000, 0),
+        (1024, 0),
+        (1026, -50),
+        (1074, -50),
+        (1076, -100),
+        (1900, -100),
+    ],
+)
 def test_target_density(density, change):
     index = (-100, -50, 0, 50, 100).index(change)
     assert target_density.policy(observe(density), None).tolist() == [5 * index + 2]
@@ -39,8 +52,9 @@ def test_random_is_uniform_over_the_valid_actions():
 
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_run_folder(script, tmp_path):
-    run_script(f"baselines_heuristic/{script}.py", "--run-dir", tmp_path, "--eval-episodes", 2,
-               "--eval-weights", 0, 0.25, 1)
+    run_script(
+        f"baselines_heuristic/{script}.py", "--run-dir", tmp_path, "--eval-episodes", 2, "--eval-weights", 0, 0.25, 1
+    )
     names = {"config.json", "evaluation.csv", "evaluation_years.csv", "summary.png", "timing.csv"}
     assert {path.name for path in tmp_path.iterdir()} == names
     episodes = pd.read_csv(tmp_path / "evaluation.csv")
@@ -51,17 +65,20 @@ def test_run_folder(script, tmp_path):
 
 
 def test_one_simulation_stands_for_every_weight(tmp_path):
-    run_script("baselines_heuristic/target_density.py", "--run-dir", tmp_path, "--eval-episodes", 2,
-               "--eval-weights", 0, 0.7)
+    run_script(
+        "baselines_heuristic/target_density.py", "--run-dir", tmp_path, "--eval-episodes", 2, "--eval-weights", 0, 0.7
+    )
     written = pd.read_csv(tmp_path / "evaluation.csv")
     args = Args(eval_episodes=2, eval_weights=(0.0, 0.7))
-    simulated, _ = protocol.evaluate(args, protocol.prepare(args), lambda observations, masks, returns:
-                                     np.eye(25)[target_density.policy(observations, masks)])
+    simulated, _ = protocol.evaluate(
+        args,
+        protocol.prepare(args),
+        lambda observations, masks, returns: np.eye(25)[target_density.policy(observations, masks)],
+    )
     pd.testing.assert_frame_equal(written, simulated, rtol=1e-8, check_dtype=False)
 
 
 def test_users_environments_are_refused(tmp_path):
     with pytest.raises(SystemExit, match="--env-id must be one of"):
-        run_script("baselines_heuristic/zero_change.py", "--env-id", "toy_env:toy-v0", "--run-dir",
-                   tmp_path / "run")
+        run_script("baselines_heuristic/zero_change.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()

@@ -8,9 +8,19 @@ from analysis.figures import training_dynamics
 from analysis.figures.common import no_data
 from analysis.results import Results
 
-PANELS = {"learning_curves": 6, "learning_asymmetry": 6, "algorithm_comparison": 4, "strategies": 4,
-          "site_influence": 2, "trade_off_coverage": 4, "training_dynamics": 2, "performance_panel": 4,
-          "individual_objectives": 4, "demographics": 7, "learning_difficulty": 4}  # fmt: skip
+PANELS = {
+    "learning_curves": 6,
+    "learning_asymmetry": 6,
+    "algorithm_comparison": 4,
+    "strategies": 4,
+    "site_influence": 2,
+    "trade_off_coverage": 4,
+    "training_dynamics": 2,
+    "performance_panel": 4,
+    "individual_objectives": 4,
+    "demographics": 7,
+    "learning_difficulty": 4,
+}
 
 
 def lettered(figure):

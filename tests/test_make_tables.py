@@ -50,6 +50,7 @@ def tables(tmp_path_factory):
 
 # ------------------------------------------------------------------- the committed runs, by hand
 
+
 def test_main_results(tables):
     row = read(tables, "main_results", ["method", "environment", "setting"]).loc[MAIN]
     assert row.seeds == 1
@@ -81,8 +82,9 @@ def test_strategies_and_fluxes(tables):
 def test_season_violations_runtime_details(tables):
     season = read(tables, "growing_season_correlations", ["method", "variable"]).loc["ppo_curriculum"]
     # returns of both episodes differ by 6 at each weight, whose means differ: r = cov / (sd sd) = 30 / sqrt(100 * 29/3)
-    assert season.r_warm.to_dict() == pytest.approx({"thaw_return": 30 / np.sqrt(100 * 29 / 3), "latent_heat_mj_m2": 1,
-                                                     "ground_shortwave_mj_m2": -1})
+    assert season.r_warm.to_dict() == pytest.approx(
+        {"thaw_return": 30 / np.sqrt(100 * 29 / 3), "latent_heat_mj_m2": 1, "ground_shortwave_mj_m2": -1}
+    )
     # there are two sites, so the season of leaves orders them as the warm days do, or the other way round
     first, second = (growing_season_correlations.season_of_leaves(seed) for seed in (11, 12))
     np.testing.assert_allclose(season.r, np.sign(second - first) * season.r_warm)
@@ -94,7 +96,8 @@ def test_season_violations_runtime_details(tables):
     runtime = read(tables, "runtime", "quantity").ours
     what = "curriculum PPO, generalist, 300,000 steps on one core"
     assert [runtime[f"{what}: {name}"] for name in ("training", "evaluation", "environment")] == pytest.approx(
-        [0.2, 0.1, 75])
+        [0.2, 0.1, 75]
+    )
     details = read(tables, "detailed_objectives", "method").loc["ppo_curriculum"].set_index("weight")
     assert details.index.tolist() == [0, 0.25, 0.5, 0.75, 1]  # the paper's too
     assert details.carbon_return.dropna().tolist() == [0, 1, 2] and details.seeds.tolist() == [1, 0, 1, 0, 1]
@@ -136,12 +139,15 @@ def test_other_formulations_are_judged_by_the_asymmetric_reward_too(tmp_path):
 
 # ---------------------------------------------------------------------------------- rows and runs
 
+
 def test_without_runs_it_names_the_commands(tmp_path):
     with pytest.raises(SystemExit) as exit:
         make(tmp_path / "runs", tmp_path / "tables")
     assert exit.value.code not in (0, None)
-    for command in ("python cleanrl_style/ppo_curriculum.py --seed 1 --vectorization lockstep",
-                    "python baselines_heuristic/zero_change.py --env-id boreal-balanced-v0"):
+    for command in (
+        "python cleanrl_style/ppo_curriculum.py --seed 1 --vectorization lockstep",
+        "python baselines_heuristic/zero_change.py --env-id boreal-balanced-v0",
+    ):
         assert command in str(exit.value)
     assert not (tmp_path / "tables").exists()
 
@@ -171,9 +177,16 @@ def test_a_method_that_no_experiment_has_is_in_every_table_of_methods(tmp_path):
     make(tmp_path / "runs", tmp_path / "tables")
     key = ("ppo_mine", "boreal-generalist-v0", "vectorization=lockstep")
     index = ["method", "environment", "setting"]
-    rows = {name: read(tmp_path / "tables", name, index).loc[[key]] for name in
-            ("main_results", "lambda_violations", "learned_strategies", "growing_season_correlations",
-             "detailed_objectives")}
+    rows = {
+        name: read(tmp_path / "tables", name, index).loc[[key]]
+        for name in (
+            "main_results",
+            "lambda_violations",
+            "learned_strategies",
+            "growing_season_correlations",
+            "detailed_objectives",
+        )
+    }
     assert rows["main_results"].seeds.tolist() == [1]
     assert rows["lambda_violations"].violations_percent.tolist() == [50]  # thaw rises from weight 0 to 0.5
     assert rows["learned_strategies"].carbon.tolist() == pytest.approx([4 / 3])
@@ -190,13 +203,24 @@ def test_a_method_that_no_experiment_has_is_in_every_table_of_methods(tmp_path):
 def test_agents_of_one_weight_form_a_front(tmp_path, capsys):
     for seed in (1, 2):
         for weight in (0.0, 0.25, 0.5, 0.75, 1.0)[: 5 if seed == 1 else 4]:
-            write_run(tmp_path / "runs" / f"{seed}-{weight}", "eupg_fixed_lambda", seed, carbon=(weight,),
-                      thaw=(1 - weight,), weights=(weight,), preference=weight, vectorization="lockstep")
+            write_run(
+                tmp_path / "runs" / f"{seed}-{weight}",
+                "eupg_fixed_lambda",
+                seed,
+                carbon=(weight,),
+                thaw=(1 - weight,),
+                weights=(weight,),
+                preference=weight,
+                vectorization="lockstep",
+            )
     row = make(tmp_path / "runs", tmp_path / "tables").loc[
-        ("eupg_fixed_lambda", "boreal-generalist-v0", "vectorization=lockstep")]
+        ("eupg_fixed_lambda", "boreal-generalist-v0", "vectorization=lockstep")
+    ]
     assert row.seeds == 1 and row.cardinality == 5 and row.sparsity == pytest.approx(2 * 0.25**2)
-    assert "eupg_fixed_lambda, boreal-generalist-v0, seed 2: partial, without the agents of the weights 1" in \
-        capsys.readouterr().err
+    assert (
+        "eupg_fixed_lambda, boreal-generalist-v0, seed 2: partial, without the agents of the weights 1"
+        in capsys.readouterr().err
+    )
 
 
 def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):
@@ -217,9 +241,11 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
     write_run(runs / "zz-first", "ppo_curriculum", seed=1)
     (runs / "unfinished" / "evaluation.csv").unlink()
     (runs / "config" / "config.json").write_text('{"script": "ppo_curriculum"}')
-    for name, change in [("truncated", lambda table: table.iloc[:-1]),
-                         ("columns", lambda table: table.drop(columns="thaw_return")),
-                         ("infinite", lambda table: table.assign(thaw_return=np.inf))]:
+    for name, change in [
+        ("truncated", lambda table: table.iloc[:-1]),
+        ("columns", lambda table: table.drop(columns="thaw_return")),
+        ("infinite", lambda table: table.assign(thaw_return=np.inf)),
+    ]:
         file = runs / name / "evaluation.csv"
         change(pd.read_csv(file)).to_csv(file, index=False)
     (runs / "partial" / "episodes.csv").unlink()
@@ -229,11 +255,16 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
     assert table.loc[("ppo_curriculum", "boreal-generalist-v0", "default")].seeds == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 8
-    for name, reason in [("unfinished", "no evaluation.csv"), ("config", "config.json"),
-                         ("truncated", "5 episodes"), ("columns", "lacks the column thaw_return"),
-                         ("infinite", "not finite"),
-                         ("partial", "partial: it has no episodes.csv"), ("broken-years", "evaluation_years.csv.gz"),
-                         ("zz-first", "the same run as")]:
+    for name, reason in [
+        ("unfinished", "no evaluation.csv"),
+        ("config", "config.json"),
+        ("truncated", "5 episodes"),
+        ("columns", "lacks the column thaw_return"),
+        ("infinite", "not finite"),
+        ("partial", "partial: it has no episodes.csv"),
+        ("broken-years", "evaluation_years.csv.gz"),
+        ("zz-first", "the same run as"),
+    ]:
         assert sum(str(runs / name) + ":" in line and reason in line for line in lines) == 1, name
 
 
@@ -261,6 +292,7 @@ def test_a_policy_without_preference_has_neither_sparsity_nor_response(tables):
 
 # ------------------------------------------------------------------------------ tables of studies
 
+
 class Studies:
     """Stands for Results, with one study."""
 
@@ -283,8 +315,11 @@ def test_physical_conflicts():
     table |= {"lower_thaw_clipped_years": [0, 0, 1, 0], "upper_thaw_clipped_years": [0, 2, 1, 0]}
     tables = [pd.DataFrame(table).assign(pair=name, off="all on") for name in physical_conflicts.PAIRS]
     table["upper_thaw_return"] = 4.0
-    tables += [pd.DataFrame(table).assign(pair=name, off=off) for name in physical_conflicts.PAIRS
-               for off in ("interception", "moss", "fire")]  # fmt: skip
+    tables += [
+        pd.DataFrame(table).assign(pair=name, off=off)
+        for name in physical_conflicts.PAIRS
+        for off in ("interception", "moss", "fire")
+    ]
     row = physical_conflicts.make(Studies(pd.concat(tables))).set_index("change").loc[pair]
     assert (row.sites, row.carbon_return, row.thaw_return) == pytest.approx((4, 2, -0.7))
     half_width = 3.182446 * np.sqrt(2 / 3) / 2  # t of 3 degrees of freedom, sd of the four, root of four
@@ -301,8 +336,15 @@ def test_verdict():
 
 
 def test_curriculum_selection():
-    sites = {"seed": 1, "site_seed": range(4), "selected": [1, 1, 0, 0], "latitude_deg": [60, 62, 58, 60],
-             "warming_mj_m2": [4, 6, 8, 10], "cooling_mj_m2": 1, "thaw_return": [1, 1, 2, 2]}
+    sites = {
+        "seed": 1,
+        "site_seed": range(4),
+        "selected": [1, 1, 0, 0],
+        "latitude_deg": [60, 62, 58, 60],
+        "warming_mj_m2": [4, 6, 8, 10],
+        "cooling_mj_m2": 1,
+        "thaw_return": [1, 1, 2, 2],
+    }
     table = curriculum_selection.make(Studies(sites)).set_index("category")
     assert table.latitude.tolist() == [61, 59, 2] and table.warming.tolist() == [5, 9, -4]
     assert table.paper_warming.dropna().tolist() == [0.5, 8.0]
@@ -318,8 +360,9 @@ def test_single_sites(tmp_path):
             flags = {"env_id": job.env_id, "weights": (job.flags["preference"],)} | job.flags
             write_run(tmp_path / str(number), job.script, carbon=(5,), thaw=(7,), **flags)
     studies = tmp_path / "studies"
-    plans = pd.DataFrame({"site_seed": 1, "action": [boreal_env.NO_CHANGE, 24], "carbon_return": [1, 4],
-                          "thaw_return": [1, 2]})  # fmt: skip
+    plans = pd.DataFrame(
+        {"site_seed": 1, "action": [boreal_env.NO_CHANGE, 24], "carbon_return": [1, 4], "thaw_return": [1, 2]}
+    )
     stored.write(studies / "constant_plans_of_sites.csv", plans, {})
     table = single_sites.make(Results((tmp_path,), jobs, studies)).set_index("site_seed")
     assert table.index.tolist() == ["1", "mean"]
@@ -345,16 +388,37 @@ def test_a_choice_that_all_years_bear_on():
 def test_what_learning_is_up_against(tmp_path):
     names = ("contrast", "objective", "weighting", "year")
     cases = product(CONTRASTS, ("carbon", "thaw"), ("return", "discounted", "GAE"), ("0", "5", "every"))
-    numbers = {"effect": 1.0, "effect_low": 0.5, "effect_high": 2.0, "carried": 0.25, "site_episodes": 7.0,
-               "site_noise": 1.0, "noise": 2.0, "years_20_50": 0.5}
+    numbers = {
+        "effect": 1.0,
+        "effect_low": 0.5,
+        "effect_high": 2.0,
+        "carried": 0.25,
+        "site_episodes": 7.0,
+        "site_noise": 1.0,
+        "noise": 2.0,
+        "years_20_50": 0.5,
+    }
     rows = [numbers | dict(zip(names, case, strict=True)) | {"reference": "uniform"} for case in cases]
     stored.write(tmp_path / "studies" / "signal_to_noise.csv", pd.DataFrame(rows), {})
-    parts = pd.DataFrame({"component": ["site", "policy"] * 2, "objective": ["carbon"] * 2 + ["thaw"] * 2,
-                          "value": "return", "share": [0.4, 0.6, 0.9, 0.1]})
+    parts = pd.DataFrame(
+        {
+            "component": ["site", "policy"] * 2,
+            "objective": ["carbon"] * 2 + ["thaw"] * 2,
+            "value": "return",
+            "share": [0.4, 0.6, 0.9, 0.1],
+        }
+    )
     stored.write(tmp_path / "variance" / "components.csv", parts, {})
-    gradients = pd.DataFrame({"utility": "total", "baseline": "none", "objective": ["carbon", "thaw", "preference"],
-                              "episodes": [20.0, np.inf, 1.0], "episodes_low": [10.0, 90.0, 1.0],
-                              "episodes_high": [30.0, np.inf, 1.0]})  # fmt: skip
+    gradients = pd.DataFrame(
+        {
+            "utility": "total",
+            "baseline": "none",
+            "objective": ["carbon", "thaw", "preference"],
+            "episodes": [20.0, np.inf, 1.0],
+            "episodes_low": [10.0, 90.0, 1.0],
+            "episodes_high": [30.0, np.inf, 1.0],
+        }
+    )
     stored.write(tmp_path / "studies" / "gradient_noise.csv", gradients, {})
     results = Results((TINY_RUNS,), experiments.jobs(), tmp_path / "studies")
     table = learning_difficulty.make(results).set_index(["of", "quantity"])

@@ -28,8 +28,15 @@ def test_a_pair_differs_in_its_one_thing(monkeypatch):
 
 
 def test_constant_plans_as_an_evaluation():
-    plans = pd.DataFrame({"action": [24, 24, 20, 20], "seed": [0, 1, 0, 1], "episode": [0, 1, 0, 1],
-                          "carbon_return": [2.0, 4.0, 1.0, 1.0], "thaw_return": [-3.0, -1.0, 0.0, 2.0]})
+    plans = pd.DataFrame(
+        {
+            "action": [24, 24, 20, 20],
+            "seed": [0, 1, 0, 1],
+            "episode": [0, 1, 0, 1],
+            "carbon_return": [2.0, 4.0, 1.0, 1.0],
+            "thaw_return": [-3.0, -1.0, 0.0, 2.0],
+        }
+    )
     best = constant_plans.as_evaluation(plans, EVAL_WEIGHTS, best=True)
     # conifers 3 w - 2 (1 - w), deciduous w + (1 - w): equal at w = 0.6
     chosen = best.groupby("preference").action.first()

@@ -19,12 +19,14 @@ def paper_front(method):
 def evaluation(carbon, thaw, weights):
     """Evaluation from returns of shape (episodes, weights)."""
     episodes = np.asarray(carbon).shape[0]
-    return pd.DataFrame({
-        "preference": np.tile(weights, episodes),
-        "seed": np.repeat(np.arange(episodes), len(weights)),
-        "carbon_return": np.ravel(carbon),
-        "thaw_return": np.ravel(thaw),
-    })
+    return pd.DataFrame(
+        {
+            "preference": np.tile(weights, episodes),
+            "seed": np.repeat(np.arange(episodes), len(weights)),
+            "carbon_return": np.ravel(carbon),
+            "thaw_return": np.ravel(thaw),
+        }
+    )
 
 
 def test_golden_front():
@@ -50,11 +52,14 @@ def test_one_point_has_no_sparsity():
     assert metrics.sparsity([(1, 1)]) == 0
 
 
-@pytest.mark.parametrize("method, hypervolume, sparsity, violations", [
-    ("curriculum_ppo", 119.80, 3.4, 50),
-    ("ppo_gated", 65.20, 19.5, 100),
-    ("eupg_variable_lambda", 24.54, 14.4, None),
-])
+@pytest.mark.parametrize(
+    "method, hypervolume, sparsity, violations",
+    [
+        ("curriculum_ppo", 119.80, 3.4, 50),
+        ("ppo_gated", 65.20, 19.5, 100),
+        ("eupg_variable_lambda", 24.54, 14.4, None),
+    ],
+)
 def test_paper_against_its_own_details(method, hypervolume, sparsity, violations):
     front = paper_front(method)
     assert metrics.hypervolume(front) == pytest.approx(hypervolume, abs=0.005)

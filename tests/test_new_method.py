@@ -26,8 +26,21 @@ def test_the_followed_example(tmp_path):
     assert f"says {changed}:" in PAGE
     path = tmp_path / "ppo_group.py"
     path.write_text(script, encoding="utf-8")
-    run_script(path, "--num-envs", 4, "--total-timesteps", 200, "--rollout-steps", 100, "--run-dir", tmp_path / "run",
-               "--eval-episodes", 1, "--eval-weights", 0.5)
+    run_script(
+        path,
+        "--num-envs",
+        4,
+        "--total-timesteps",
+        200,
+        "--rollout-steps",
+        100,
+        "--run-dir",
+        tmp_path / "run",
+        "--eval-episodes",
+        1,
+        "--eval-weights",
+        0.5,
+    )
     episodes = pd.read_csv(tmp_path / "run" / "episodes.csv")
     assert len(episodes) == 4 and episodes.site_seed.nunique() == 1
     assert len(pd.read_csv(tmp_path / "run" / "evaluation.csv")) == 2
@@ -37,10 +50,25 @@ def test_the_environment_of_ones_own(tmp_path, monkeypatch):
     (tmp_path / "pond.py").write_text(block("python").replace("# pond.py\n", ""), encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
-    run_script("cleanrl_style/eupg_var_lambda.py", "--env-id", "pond:pond-v0", "--total-timesteps", 160,
-               "--num-envs", 2, "--run-dir", tmp_path / "run", "--eval-episodes", 1, "--eval-weights", 0, 1)
+    run_script(
+        "cleanrl_style/eupg_var_lambda.py",
+        "--env-id",
+        "pond:pond-v0",
+        "--total-timesteps",
+        160,
+        "--num-envs",
+        2,
+        "--run-dir",
+        tmp_path / "run",
+        "--eval-episodes",
+        1,
+        "--eval-weights",
+        0,
+        1,
+    )
     table = pd.read_csv(tmp_path / "run" / "evaluation.csv")
     mixes = table.carbon_return / 10
     assert (table.thaw_return <= 10 * (1 - mixes**2) + 1e-6).all()  # the mean of squares is no less than the square
     assert table.scalarized_return.to_numpy() == pytest.approx(
-        (table.preference * table.carbon_return + (1 - table.preference) * table.thaw_return).to_numpy())
+        (table.preference * table.carbon_return + (1 - table.preference) * table.thaw_return).to_numpy()
+    )

@@ -27,8 +27,25 @@ def make_agent(seed=0):
 
 
 def train(folder, *arguments, env_id="toy_env:toy-sites-v0"):
-    run_script(SCRIPT, "--env-id", env_id, "--run-dir", folder, "--total-timesteps", 640, "--num-envs", 4,
-               "--rollout-steps", 256, "--eval-episodes", 2, "--eval-weights", 0, 1, *arguments)
+    run_script(
+        SCRIPT,
+        "--env-id",
+        env_id,
+        "--run-dir",
+        folder,
+        "--total-timesteps",
+        640,
+        "--num-envs",
+        4,
+        "--rollout-steps",
+        256,
+        "--eval-episodes",
+        2,
+        "--eval-weights",
+        0,
+        1,
+        *arguments,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -103,8 +120,15 @@ def test_gae_of_two_objectives_is_that_of_their_weighted_sum():
     weights = torch.tensor([0.3, 0.7], dtype=torch.double)
 
     vector = compute_gae(rewards, values, dones, next_value, last_done, 0.9, 0.8)
-    scalar = compute_gae((rewards @ weights)[..., None], (values @ weights)[..., None], dones,
-                         (next_value @ weights)[..., None], last_done, 0.9, 0.8)
+    scalar = compute_gae(
+        (rewards @ weights)[..., None],
+        (values @ weights)[..., None],
+        dones,
+        (next_value @ weights)[..., None],
+        last_done,
+        0.9,
+        0.8,
+    )
     assert vector.shape == (20, 3, 2)
     torch.testing.assert_close((vector @ weights)[..., None], scalar)
 
@@ -156,8 +180,25 @@ def test_without_site_observations_every_episode_is_accepted():
 def test_one_site_in_all_episodes_is_accepted(tmp_path):
     """This site scores below the threshold: the agent would never be trained."""
     assert make_curriculum().score(boreal_env.sample_site_observations([2]))[0] < 0.5
-    run_script(SCRIPT, "--site-seed", 2, "--vectorization", "lockstep", "--num-envs", 2, "--rollout-steps", 100,
-               "--total-timesteps", 100, "--eval-episodes", 1, "--eval-weights", 0.5, "--run-dir", tmp_path)
+    run_script(
+        SCRIPT,
+        "--site-seed",
+        2,
+        "--vectorization",
+        "lockstep",
+        "--num-envs",
+        2,
+        "--rollout-steps",
+        100,
+        "--total-timesteps",
+        100,
+        "--eval-episodes",
+        1,
+        "--eval-weights",
+        0.5,
+        "--run-dir",
+        tmp_path,
+    )
     assert pd.read_csv(tmp_path / "updates.csv").selected_transitions.tolist() == [100]
 
 
@@ -170,14 +211,17 @@ def test_a_coin_accepts_half_whatever_the_site():
     assert (again == scores).all() and abs(np.corrcoef(other, scores)[0, 1]) < 0.05
 
 
-@pytest.mark.parametrize("finished, factor", [
-    ([(0.5, 2.0, True), (0.5, 1.0, False)], 0.999),
-    ([(0.5, 1.0, True), (0.5, 2.0, False)], 1.001),
-    ([(0.5, 1.0, True), (0.5, 1.0, False)], 1.001),
-    ([(0.5, 1.0, True), (0.5, 2.0, True)], 1),
-    ([(0.5, 1.0, False)], 1),
-    ([], 1),
-])
+@pytest.mark.parametrize(
+    "finished, factor",
+    [
+        ([(0.5, 2.0, True), (0.5, 1.0, False)], 0.999),
+        ([(0.5, 1.0, True), (0.5, 2.0, False)], 1.001),
+        ([(0.5, 1.0, True), (0.5, 1.0, False)], 1.001),
+        ([(0.5, 1.0, True), (0.5, 2.0, True)], 1),
+        ([(0.5, 1.0, False)], 1),
+        ([], 1),
+    ],
+)
 def test_threshold_rule(finished, factor):
     curriculum = make_curriculum()
     curriculum.finished = finished
@@ -224,8 +268,16 @@ def test_updates_use_exactly_the_steps_of_selected_episodes(finished_run):
 
 
 def test_episodes_are_scored_by_their_own_site(tmp_path):
-    train(tmp_path, "--total-timesteps", 400, "--vectorization", "lockstep", "--eval-episodes", 1,
-          env_id="boreal-generalist-v0")
+    train(
+        tmp_path,
+        "--total-timesteps",
+        400,
+        "--vectorization",
+        "lockstep",
+        "--eval-episodes",
+        1,
+        env_id="boreal-generalist-v0",
+    )
     episodes = pd.read_csv(tmp_path / "episodes.csv")
     observations = np.zeros((len(episodes), OBSERVATIONS), np.float32)
     observations[:, -62:] = boreal_env.sample_site_observations(episodes.site_seed)
@@ -271,9 +323,14 @@ def test_a_coins_run_resumes_to_the_same_bytes(tmp_path, monkeypatch):
 # ------------------------------------------------------------------------------------------------- script
 
 
-@pytest.mark.parametrize("arguments", [
-    ["--reward-scales", 3, 0.5], ["--per-objective-advantages"], ["--per-objective-advantages", "--clip-vloss"],
-])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--reward-scales", 3, 0.5],
+        ["--per-objective-advantages"],
+        ["--per-objective-advantages", "--clip-vloss"],
+    ],
+)
 def test_a_flag_changes_the_updates_and_no_units(arguments, finished_run, tmp_path):
     train(tmp_path, *arguments)
     ours, default = (pd.read_csv(folder / "updates.csv") for folder in (tmp_path, finished_run))
@@ -284,16 +341,37 @@ def test_a_flag_changes_the_updates_and_no_units(arguments, finished_run, tmp_pa
         pd.testing.assert_frame_equal(ours[first], default[first])
     np.testing.assert_allclose(
         ours.scalarized_return,
-        ours.preference * ours.carbon_return + (1 - ours.preference) * ours.thaw_return, rtol=1e-6)
+        ours.preference * ours.carbon_return + (1 - ours.preference) * ours.thaw_return,
+        rtol=1e-6,
+    )
 
 
-@pytest.mark.parametrize("script, arguments", [
-    ("ppo_gated", ["--rollout-steps", "100"]), ("ppo_curriculum", ["--rollout-steps", "100", "--selector", "coin"]),
-    ("eupg_var_lambda", []),
-])
+@pytest.mark.parametrize(
+    "script, arguments",
+    [
+        ("ppo_gated", ["--rollout-steps", "100"]),
+        ("ppo_curriculum", ["--rollout-steps", "100", "--selector", "coin"]),
+        ("eupg_var_lambda", []),
+    ],
+)
 def test_hiding_the_site_leaves_43_observations(script, arguments, tmp_path):
-    run_script(f"cleanrl_style/{script}.py", "--hide-site", "--run-dir", tmp_path, "--total-timesteps", 100,
-               "--num-envs", 2, "--vectorization", "lockstep", "--eval-episodes", 1, "--eval-weights", 0.5, *arguments)
+    run_script(
+        f"cleanrl_style/{script}.py",
+        "--hide-site",
+        "--run-dir",
+        tmp_path,
+        "--total-timesteps",
+        100,
+        "--num-envs",
+        2,
+        "--vectorization",
+        "lockstep",
+        "--eval-episodes",
+        1,
+        "--eval-weights",
+        0.5,
+        *arguments,
+    )
     agent = torch.load(tmp_path / "checkpoint.pt", weights_only=False)["agent"]
     accrued_returns = 2 if "eupg" in script else 0
     assert agent["actor.0.weight"].shape[1] == OBSERVATIONS - 62 + accrued_returns
@@ -303,8 +381,15 @@ def test_hiding_the_site_leaves_43_observations(script, arguments, tmp_path):
 def test_same_command_twice_gives_the_same_bytes(finished_run, tmp_path):
     train(tmp_path / "second")
     names = {path.name for path in finished_run.iterdir()}
-    assert names == {"config.json", "episodes.csv", "updates.csv", "evaluation.csv", "timing.csv",
-                     "checkpoint.pt", "summary.png"}
+    assert names == {
+        "config.json",
+        "episodes.csv",
+        "updates.csv",
+        "evaluation.csv",
+        "timing.csv",
+        "checkpoint.pt",
+        "summary.png",
+    }
     for name in names - {"timing.csv"}:
         assert (finished_run / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
 
@@ -324,39 +409,61 @@ def test_a_finished_run_is_left_alone(finished_run, capsys):
 
 
 def test_learns_the_toy(tmp_path):
-    train(tmp_path, "--vectorization", "lockstep", "--total-timesteps", 48_000, "--num-envs", 32, "--rollout-steps",
-          1280, "--minibatch-size", 128, "--learning-rate", 0.003, "--eval-episodes", 10, "--eval-weights", 0, 0.5, 1,
-          env_id="toy_env:toy-lockstep-v0")
+    train(
+        tmp_path,
+        "--vectorization",
+        "lockstep",
+        "--total-timesteps",
+        48_000,
+        "--num-envs",
+        32,
+        "--rollout-steps",
+        1280,
+        "--minibatch-size",
+        128,
+        "--learning-rate",
+        0.003,
+        "--eval-episodes",
+        10,
+        "--eval-weights",
+        0,
+        0.5,
+        1,
+        env_id="toy_env:toy-lockstep-v0",
+    )
     evaluation = pd.read_csv(tmp_path / "evaluation.csv")
     returns = evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean()
     for weight in (0.0, 0.5, 1.0):
         assert returns[weight] > 0.95 * optimal_return(weight)
 
 
-@pytest.mark.parametrize("arguments, message", [
-    (["--eval-weights", "0", "1.5"], "--eval-weights must lie in [0, 1], not 1.5"),
-    (["--eval-weights", "nan"], "--eval-weights must lie in [0, 1], not nan"),
-    (["--eval-weights", "0", "0"], "none twice"),
-    (["--eval-episodes", "0"], "--eval-episodes must lie in [1, "),
-    (["--env-id", "forest-v0"], "forest"),
-    (["--env-id", "no_such_module:forest-v0"], "no_such_module"),
-    (["--env-id", "CartPole-v1"], "Discrete(25)"),
-    (["--num-envs", "7"], "multiple of --num-envs 7"),
-    (["--num-envs", "0"], "--num-envs must lie in [1, 1000], not 0"),
-    (["--total-timesteps", "3"], "--total-timesteps 3"),
-    (["--seed", "-1"], "--seed must lie in [0, 999999], not -1"),
-    (["--gamma", "1.1"], "--gamma must lie in [0, 1], not 1.1"),
-    (["--mode", "site-specific", "--env-id", "boreal-generalist-v0"], "contradicts"),
-    (["--mode", "generalist", "--env-id", "boreal_env:boreal-site-specific-v0"], "contradicts"),
-    (["--site-seed", "3", "--env-id", "toy_env:toy-v0"], "--site-seed is for boreal-generalist-v0, "),
-    (["--thaw-formulation", "contrast", "--env-id", "toy_env:toy-v0"], "not for --env-id toy_env:toy-v0"),
-    (["--vectorization", "lockstep", "--env-id", "toy_env:toy-v0"], "no vector entry point"),
-    (["--reward-scales", "1", "-1"], "--reward-scales must lie in [0, 1000000], not -1"),
-    (["--hide-site", "--mode", "site-specific"], "--hide-site is for boreal-generalist-v0 and boreal-balanced-v0"),
-    (["--hide-site", "--env-id", "toy_env:toy-v0"], "--env-id toy_env:toy-v0 observes no site parameters"),
-    (["--hide-site"], "--hide-site leaves --selector network nothing to score"),
-    (["--selector", "coin", "--raw-selector"], "--raw-selector is for --selector network"),
-])
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["--eval-weights", "0", "1.5"], "--eval-weights must lie in [0, 1], not 1.5"),
+        (["--eval-weights", "nan"], "--eval-weights must lie in [0, 1], not nan"),
+        (["--eval-weights", "0", "0"], "none twice"),
+        (["--eval-episodes", "0"], "--eval-episodes must lie in [1, "),
+        (["--env-id", "forest-v0"], "forest"),
+        (["--env-id", "no_such_module:forest-v0"], "no_such_module"),
+        (["--env-id", "CartPole-v1"], "Discrete(25)"),
+        (["--num-envs", "7"], "multiple of --num-envs 7"),
+        (["--num-envs", "0"], "--num-envs must lie in [1, 1000], not 0"),
+        (["--total-timesteps", "3"], "--total-timesteps 3"),
+        (["--seed", "-1"], "--seed must lie in [0, 999999], not -1"),
+        (["--gamma", "1.1"], "--gamma must lie in [0, 1], not 1.1"),
+        (["--mode", "site-specific", "--env-id", "boreal-generalist-v0"], "contradicts"),
+        (["--mode", "generalist", "--env-id", "boreal_env:boreal-site-specific-v0"], "contradicts"),
+        (["--site-seed", "3", "--env-id", "toy_env:toy-v0"], "--site-seed is for boreal-generalist-v0, "),
+        (["--thaw-formulation", "contrast", "--env-id", "toy_env:toy-v0"], "not for --env-id toy_env:toy-v0"),
+        (["--vectorization", "lockstep", "--env-id", "toy_env:toy-v0"], "no vector entry point"),
+        (["--reward-scales", "1", "-1"], "--reward-scales must lie in [0, 1000000], not -1"),
+        (["--hide-site", "--mode", "site-specific"], "--hide-site is for boreal-generalist-v0 and boreal-balanced-v0"),
+        (["--hide-site", "--env-id", "toy_env:toy-v0"], "--env-id toy_env:toy-v0 observes no site parameters"),
+        (["--hide-site"], "--hide-site leaves --selector network nothing to score"),
+        (["--selector", "coin", "--raw-selector"], "--raw-selector is for --selector network"),
+    ],
+)
 def test_bad_arguments_leave_nothing_behind(arguments, message, tmp_path):
     with pytest.raises(SystemExit, match="^error: ") as exit:
         run_script(SCRIPT, "--run-dir", tmp_path / "run", *arguments)
@@ -368,21 +475,25 @@ def test_bad_arguments_leave_nothing_behind(arguments, message, tmp_path):
 def test_refusal_on_the_command_line(arguments, tmp_path):
     command = [sys.executable, ROOT / SCRIPT, "--env-id", "toy_env:toy-v0", *arguments]
     path = os.pathsep.join([str(ROOT), str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")])
-    result = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path,
-                            env={**os.environ, "PYTHONPATH": path})
+    result = subprocess.run(
+        command, capture_output=True, text=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}
+    )
     assert result.returncode != 0
     assert arguments[1] in result.stderr and "Traceback" not in result.stderr
     assert result.stdout == "" and not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("given, env_id, mode, steps, envs", [
-    ({}, "boreal-generalist-v0", "generalist", 300_000, 8),
-    ({"mode": "site-specific"}, "boreal-site-specific-v0", "site-specific", 100_000, 8),
-    ({"env_id": "boreal-site-specific-v0"}, "boreal-site-specific-v0", "site-specific", 100_000, 8),
-    ({"env_id": "boreal_env:boreal-generalist-v0"}, "boreal-generalist-v0", "generalist", 300_000, 8),
-    ({"env_id": "boreal-balanced-v0"}, "boreal-balanced-v0", "generalist", 300_000, 8),
-    ({"vectorization": "lockstep"}, "boreal-generalist-v0", "generalist", 300_000, 32),
-])
+@pytest.mark.parametrize(
+    "given, env_id, mode, steps, envs",
+    [
+        ({}, "boreal-generalist-v0", "generalist", 300_000, 8),
+        ({"mode": "site-specific"}, "boreal-site-specific-v0", "site-specific", 100_000, 8),
+        ({"env_id": "boreal-site-specific-v0"}, "boreal-site-specific-v0", "site-specific", 100_000, 8),
+        ({"env_id": "boreal_env:boreal-generalist-v0"}, "boreal-generalist-v0", "generalist", 300_000, 8),
+        ({"env_id": "boreal-balanced-v0"}, "boreal-balanced-v0", "generalist", 300_000, 8),
+        ({"vectorization": "lockstep"}, "boreal-generalist-v0", "generalist", 300_000, 32),
+    ],
+)
 def test_defaults_that_depend_on_others(given, env_id, mode, steps, envs):
     args = Args(**given)
     protocol.resolve(args)

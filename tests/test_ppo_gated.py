@@ -14,9 +14,9 @@ from cleanrl_style.ppo_gated import Args, ppo_losses
 def body(script):
     """A script without its header comment and the docstring of its arguments."""
     source = (ROOT / "cleanrl_style" / f"{script}.py").read_text()
-    source = source[source.index("import math"):]
+    source = source[source.index("import math") :]
     start = source.index('    """')
-    return source[:start] + source[source.index('"""', start + 7):]
+    return source[:start] + source[source.index('"""', start + 7) :]
 
 
 def test_ppo_curriculum_is_ppo_gated_and_its_marked_blocks():
@@ -65,7 +65,7 @@ def test_losses_and_their_gradient_are_those_of_an_independent_implementation(no
     n = 16
     x, mask = generator.normal(size=(n, OBSERVATIONS)), generator.random((n, 25)) < 0.5
     mask[:, 12] = mask[: n // 2, 20] = True
-    mask[n // 2:, 15:] = False
+    mask[n // 2 :, 15:] = False
     action = np.array([generator.choice(np.flatnonzero(row)) for row in mask])
     batch = [x, mask, action]
     with torch.no_grad():
@@ -93,9 +93,31 @@ def test_losses_and_their_gradient_are_those_of_an_independent_implementation(no
 
 
 def test_learns_the_toy(tmp_path):
-    run_script("cleanrl_style/ppo_gated.py", "--env-id", "toy_env:toy-lockstep-v0", "--run-dir", tmp_path,
-               "--vectorization", "lockstep", "--total-timesteps", 48_000, "--num-envs", 32, "--rollout-steps", 1280,
-               "--minibatch-size", 128, "--learning-rate", 0.003, "--eval-episodes", 10, "--eval-weights", 0, 0.5, 1)
+    run_script(
+        "cleanrl_style/ppo_gated.py",
+        "--env-id",
+        "toy_env:toy-lockstep-v0",
+        "--run-dir",
+        tmp_path,
+        "--vectorization",
+        "lockstep",
+        "--total-timesteps",
+        48_000,
+        "--num-envs",
+        32,
+        "--rollout-steps",
+        1280,
+        "--minibatch-size",
+        128,
+        "--learning-rate",
+        0.003,
+        "--eval-episodes",
+        10,
+        "--eval-weights",
+        0,
+        0.5,
+        1,
+    )
     evaluation = pd.read_csv(tmp_path / "evaluation.csv")
     returns = evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean()
     assert all(returns[weight] > 0.95 * optimal_return(weight) for weight in (0.0, 0.5, 1.0))
@@ -109,15 +131,44 @@ def test_tracking_without_the_package_is_refused(tmp_path, monkeypatch):
 
 
 def test_a_single_transition_has_no_explained_variance(tmp_path, recwarn):
-    run_script("cleanrl_style/ppo_gated.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path, "--total-timesteps",
-               1, "--num-envs", 1, "--eval-episodes", 1, "--eval-weights", 0.5)
+    run_script(
+        "cleanrl_style/ppo_gated.py",
+        "--env-id",
+        "toy_env:toy-v0",
+        "--run-dir",
+        tmp_path,
+        "--total-timesteps",
+        1,
+        "--num-envs",
+        1,
+        "--eval-episodes",
+        1,
+        "--eval-weights",
+        0.5,
+    )
     assert pd.read_csv(tmp_path / "updates.csv").explained_variance.isna().all() and not recwarn.list
 
 
 def test_one_site_under_all_weathers(tmp_path):
-    run_script("cleanrl_style/ppo_gated.py", "--site-seed", 3, "--vectorization", "lockstep", "--num-envs", 2,
-               "--rollout-steps", 100, "--total-timesteps", 100, "--eval-episodes", 2, "--eval-weights", 0.5,
-               "--run-dir", tmp_path / "run")  # fmt: skip
+    run_script(
+        "cleanrl_style/ppo_gated.py",
+        "--site-seed",
+        3,
+        "--vectorization",
+        "lockstep",
+        "--num-envs",
+        2,
+        "--rollout-steps",
+        100,
+        "--total-timesteps",
+        100,
+        "--eval-episodes",
+        2,
+        "--eval-weights",
+        0.5,
+        "--run-dir",
+        tmp_path / "run",
+    )
     for name in ("episodes", "evaluation"):
         table = pd.read_csv(tmp_path / "run" / f"{name}.csv")
         assert set(table.site_seed) == {3} and table.thaw_return.nunique() > 1

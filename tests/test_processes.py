@@ -127,9 +127,19 @@ def test_the_year_is_warmest_on_the_warmest_day():
 
 @pytest.mark.parametrize(
     ("day", "celsius", "kind"),
-    [(200, 15, 2), (150, -1, 2), (30, -20, 0), (30, 5, 0), (100, -1, 0), (100, 1, 1), (130, -1, 1), (280, -1, 0),
-     (280, 1, 1), (340, 1, 0)],
-)  # fmt: skip
+    [
+        (200, 15, 2),
+        (150, -1, 2),
+        (30, -20, 0),
+        (30, 5, 0),
+        (100, -1, 0),
+        (100, 1, 1),
+        (130, -1, 1),
+        (280, -1, 0),
+        (280, 1, 1),
+        (340, 1, 0),
+    ],
+)
 def test_precipitation_season(day, celsius, kind):
     windows = (150, 250, 90, 150, 250, 300, 120, 270)
     assert weather.precipitation_season(day, celsius, *windows) == kind
@@ -265,11 +275,7 @@ def test_snow_hides_the_ground():
     per_mm = 1.0 / (250.0 * 0.1)  # hidden from 10 cm on
     assert snow.surface_albedo(0.0, per_mm, 0.8, 0.2) == approx(0.2)
     assert snow.surface_albedo(12.5, per_mm, 0.8, 0.2) == approx(0.5)  # 12.5 mm of water in 5 cm of snow
-    assert (
-        snow.surface_albedo(25.0, per_mm, 0.8, 0.2)
-        == snow.surface_albedo(90.0, per_mm, 0.8, 0.2)
-        == approx(0.8)
-    )
+    assert snow.surface_albedo(25.0, per_mm, 0.8, 0.2) == snow.surface_albedo(90.0, per_mm, 0.8, 0.2) == approx(0.8)
 
 
 def test_ground_profile():
@@ -369,12 +375,44 @@ def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
         )
         source, emission, slope, emissivity, cover = *generator.uniform(0.0, 400.0, 2), 4.6, 0.97, generator.random()
         canopy_emission = generator.uniform(200.0, 400.0)
-        (deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base, trunk_by_canopy, trunk_by_ground,
-         ground_base, ground_by_emission, ground_by_canopy, stiffness, yielding) = soil.respond_to_canopy(
-            trunk, trunk_inertia, canopy_trunk, trunk_air, trunk_ground,
-            ground, ground_inertia, ground_air, source, emission, slope, vapour, emissivity, cover, air,
-            surface, surface_inertia, ground_surface, deep, deep_inertia, surface_deep, below, boundary,
-        )  # fmt: skip
+        (
+            deep_base,
+            deep_by_surface,
+            surface_base,
+            surface_by_ground,
+            trunk_base,
+            trunk_by_canopy,
+            trunk_by_ground,
+            ground_base,
+            ground_by_emission,
+            ground_by_canopy,
+            stiffness,
+            yielding,
+        ) = soil.respond_to_canopy(
+            trunk,
+            trunk_inertia,
+            canopy_trunk,
+            trunk_air,
+            trunk_ground,
+            ground,
+            ground_inertia,
+            ground_air,
+            source,
+            emission,
+            slope,
+            vapour,
+            emissivity,
+            cover,
+            air,
+            surface,
+            surface_inertia,
+            ground_surface,
+            deep,
+            deep_inertia,
+            surface_deep,
+            below,
+            boundary,
+        )
         new_ground = ground_base + ground_by_emission * canopy_emission + ground_by_canopy * canopy_now
         new_surface = surface_base + surface_by_ground * new_ground
         new = [
@@ -384,20 +422,29 @@ def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
             deep_base + deep_by_surface * new_surface,
         ]
         # Inertia x change = heat in - heat out, for trunk, ground, surface and deep soil.
-        matrix = np.array([
-            [trunk_inertia + canopy_trunk + trunk_air + trunk_ground, -trunk_ground, 0.0, 0.0],
-            [-trunk_ground, ground_inertia + emissivity * slope + ground_air + vapour + trunk_ground + ground_surface,
-             -ground_surface, 0.0],
-            [0.0, -ground_surface, surface_inertia + ground_surface + surface_deep, -surface_deep],
-            [0.0, 0.0, -surface_deep, deep_inertia + surface_deep + below],
-        ])  # fmt: skip
+        matrix = np.array(
+            [
+                [trunk_inertia + canopy_trunk + trunk_air + trunk_ground, -trunk_ground, 0.0, 0.0],
+                [
+                    -trunk_ground,
+                    ground_inertia + emissivity * slope + ground_air + vapour + trunk_ground + ground_surface,
+                    -ground_surface,
+                    0.0,
+                ],
+                [0.0, -ground_surface, surface_inertia + ground_surface + surface_deep, -surface_deep],
+                [0.0, 0.0, -surface_deep, deep_inertia + surface_deep + below],
+            ]
+        )
         right = [
             trunk_inertia * trunk + canopy_trunk * canopy_now + trunk_air * air,
-            ground_inertia * ground + source + emissivity * (cover * canopy_emission - emission + slope * ground)
-            + ground_air * air + vapour * ground,
+            ground_inertia * ground
+            + source
+            + emissivity * (cover * canopy_emission - emission + slope * ground)
+            + ground_air * air
+            + vapour * ground,
             surface_inertia * surface,
             deep_inertia * deep + below * boundary,
-        ]  # fmt: skip
+        ]
         np.testing.assert_allclose(new, np.linalg.solve(matrix, right), rtol=1e-9, atol=1e-9)
         assert yielding == 1.0 / stiffness
         assert yielding == approx(np.linalg.inv(matrix)[1, 1])  # warming of the ground per W m-2 into it
@@ -435,9 +482,28 @@ def test_stress_ramp():
 def test_slope_of_the_canopy_balance_is_its_derivative(trial, melt_span):
     def balance(t):
         return canopy.canopy_balance(
-            t, 12.0, 250.0, 280.0, 0.7, 0.98, 1.0, melt_span, 1.3, 1.5, 0.01, 0.05, 0.4, 0.3, 0.2, 1.4,
-            6.0, 25.0, 0.4, 0.1, 8.0,
-        )  # fmt: skip
+            t,
+            12.0,
+            250.0,
+            280.0,
+            0.7,
+            0.98,
+            1.0,
+            melt_span,
+            1.3,
+            1.5,
+            0.01,
+            0.05,
+            0.4,
+            0.3,
+            0.2,
+            1.4,
+            6.0,
+            25.0,
+            0.4,
+            0.1,
+            8.0,
+        )
 
     step = 1e-4
     residual, slope, by_emission, net, _ = balance(trial)
@@ -450,9 +516,28 @@ def test_slope_of_the_canopy_balance_is_its_derivative(trial, melt_span):
 def test_melting_snow_holds_the_ground_at_zero_until_it_is_gone():
     def ground(base, melt_span, bare_gain):
         return canopy.canopy_balance(
-            2.0, 0.0, 250.0, 280.0, 0.7, 0.98, 0.0, melt_span, bare_gain, base, 0.0, 0.0, 0.4, 0.3, 0.2, 1.4,
-            6.0, 25.0, 0.4, 0.1, 8.0,
-        )[4]  # fmt: skip
+            2.0,
+            0.0,
+            250.0,
+            280.0,
+            0.7,
+            0.98,
+            0.0,
+            melt_span,
+            bare_gain,
+            base,
+            0.0,
+            0.0,
+            0.4,
+            0.3,
+            0.2,
+            1.4,
+            6.0,
+            25.0,
+            0.4,
+            0.1,
+            8.0,
+        )[4]
 
     assert [ground(base, 3.0, 1.5) for base in (-4.0, 0.0, 2.0, 3.0, 5.0)] == [-4.0, 0.0, 0.0, 0.0, 3.0]
     assert [ground(base, 0.0, 1.0) for base in (-4.0, 0.0, 5.0)] == [-4.0, 0.0, 5.0]

@@ -56,7 +56,8 @@ def test_the_optimal_policy_earns_the_optimum():
     np.testing.assert_allclose(episodes.scalarized_return, episodes.preference.map(optimal_return), rtol=1e-6)
     np.testing.assert_allclose(
         episodes.scalarized_return,
-        episodes.preference * episodes.carbon_return + (1 - episodes.preference) * episodes.thaw_return)
+        episodes.preference * episodes.carbon_return + (1 - episodes.preference) * episodes.thaw_return,
+    )
 
 
 def test_results_do_not_depend_on_the_chunks(monkeypatch):
@@ -113,8 +114,9 @@ def test_a_diverged_policy_is_refused(uniforms):
 
 
 def test_statistics_of_the_annual_record():
-    records = [{"year": np.array([1, 2]), "density": np.array([1.0, 2.0]) * k, "fraction": np.full(2, k)}
-               for k in range(5)]
+    records = [
+        {"year": np.array([1, 2]), "density": np.array([1.0, 2.0]) * k, "fraction": np.full(2, k)} for k in range(5)
+    ]
     table = evaluation.summarize_years("greedy", 0.5, records).set_index(["variable", "year"])
     assert len(table) == 4
     row = table.loc[("density", 2)]
@@ -127,8 +129,7 @@ def test_boreal_environments_are_evaluated_on_the_same_sites_with_their_annual_r
     def zero_change(observations, masks, accrued_returns):
         return np.eye(25)[np.full(len(observations), 12)]
 
-    episodes, years = evaluate(zero_change, env_id="boreal-generalist-v0", eval_episodes=2,
-                               eval_weights=(0.0, 1.0))
+    episodes, years = evaluate(zero_change, env_id="boreal-generalist-v0", eval_episodes=2, eval_weights=(0.0, 1.0))
     paired = episodes.groupby("seed")[["site_seed", "carbon_return", "thaw_return"]]
     assert paired.nunique().eq(1).all(axis=None)
     assert episodes.site_seed.nunique() == 2
@@ -190,8 +191,11 @@ def test_replacing_keeps_the_old_file_if_writing_fails(tmp_path):
 def test_other_arguments_are_refused_and_named(tmp_path):
     make_run(tmp_path, colour="red")
     before = (tmp_path / "config.json").read_bytes()
-    with pytest.raises(SystemExit, match="colour red there, blue now; eval_episodes 3 there, 4 now|"
-                                         "eval_episodes 3 there, 4 now; colour red there, blue now"):
+    with pytest.raises(
+        SystemExit,
+        match="colour red there, blue now; eval_episodes 3 there, 4 now|"
+        "eval_episodes 3 there, 4 now; colour red there, blue now",
+    ):
         make_run(tmp_path, colour="blue", eval_episodes=4)
     assert (tmp_path / "config.json").read_bytes() == before
 
@@ -249,8 +253,11 @@ def test_unwritable_folders_are_refused(tmp_path):
 
 def test_folder_names_say_what_is_not_default(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for changes, name in [({}, "toy-v0"), ({"colour": "blue"}, "toy-v0-colour=blue"),
-                          ({"eval_weights": (0.0, 0.25)}, "toy-v0-eval_weights=0,0.25")]:
+    for changes, name in [
+        ({}, "toy-v0"),
+        ({"colour": "blue"}, "toy-v0-colour=blue"),
+        ({"eval_weights": (0.0, 0.25)}, "toy-v0-eval_weights=0,0.25"),
+    ]:
         args = Arguments(**changes)
         protocol.prepare(args)
         assert str(protocol.Run(args, "script").folder) == f"runs/script/{name}/seed1"
@@ -273,11 +280,25 @@ def test_progress_is_shown_at_once_and_at_the_end(capsys):
 
 
 def test_summary_of_a_run_is_a_picture_and_a_table(tmp_path, capsys):
-    run_script("cleanrl_style/ppo_curriculum.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path,
-               "--total-timesteps", 80, "--num-envs", 2, "--eval-episodes", 1, "--eval-weights", 0, 0.5)
+    run_script(
+        "cleanrl_style/ppo_curriculum.py",
+        "--env-id",
+        "toy_env:toy-v0",
+        "--run-dir",
+        tmp_path,
+        "--total-timesteps",
+        80,
+        "--num-envs",
+        2,
+        "--eval-episodes",
+        1,
+        "--eval-weights",
+        0,
+        0.5,
+    )
     assert (tmp_path / "summary.png").read_bytes().startswith(b"\x89PNG")
     lines = capsys.readouterr().out.splitlines()
-    table = lines[next(i for i, line in enumerate(lines) if line.startswith("weight")):]
+    table = lines[next(i for i, line in enumerate(lines) if line.startswith("weight")) :]
     assert [line.split()[0] for line in table[1:4]] == ["0.00", "0.50", "mean"]
     assert {len(line.split()) for line in table[:4]} == {7}
 
@@ -285,8 +306,23 @@ def test_summary_of_a_run_is_a_picture_and_a_table(tmp_path, capsys):
 @pytest.mark.parametrize("script", ["ppo_gated", "eupg_var_lambda"])
 def test_an_environment_need_not_mind_its_types(tmp_path, script):
     rollout = ("--rollout-steps", 20) if script == "ppo_gated" else ()
-    run_script(f"cleanrl_style/{script}.py", "--env-id", "toy_env:loose-toy-v0", "--run-dir", tmp_path, "--num-envs", 2,
-               "--total-timesteps", 40, "--eval-episodes", 2, "--eval-weights", 0, 1, *rollout)  # fmt: skip
+    run_script(
+        f"cleanrl_style/{script}.py",
+        "--env-id",
+        "toy_env:loose-toy-v0",
+        "--run-dir",
+        tmp_path,
+        "--num-envs",
+        2,
+        "--total-timesteps",
+        40,
+        "--eval-episodes",
+        2,
+        "--eval-weights",
+        0,
+        1,
+        *rollout,
+    )
     assert len(pd.read_csv(tmp_path / "evaluation.csv")) == 8
 
 
@@ -298,5 +334,14 @@ def test_an_environment_without_a_valid_action_is_refused(tmp_path):
 
 def test_a_budget_without_room_for_a_batch_is_refused(tmp_path):
     with pytest.raises(SystemExit, match="--total-timesteps 8 has no room for a batch.*: 20 steps"):
-        run_script("cleanrl_style/eupg_var_lambda.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path,
-                   "--num-envs", 2, "--total-timesteps", 8)  # fmt: skip
+        run_script(
+            "cleanrl_style/eupg_var_lambda.py",
+            "--env-id",
+            "toy_env:toy-v0",
+            "--run-dir",
+            tmp_path,
+            "--num-envs",
+            2,
+            "--total-timesteps",
+            8,
+        )

@@ -191,8 +191,13 @@ def scale(name, value, seconds):
     """Natural scale of a quantity: its size, at least what 1000 W m-2 or 1 mgC m-2 s-1 make of it in a step."""
     unit = (STATE.get(name) or RECORD.get(name) or ("1", ""))[0]
     unit = "MJ m-2" if name.endswith("_mj_m2") else "degC" if name.endswith("_temperature_c") else unit
-    least = {"degC": 273.15, "mm": 4e-4 * seconds, "J m-2": 1e3 * seconds, "MJ m-2": 1e-3 * seconds,
-             "kgC m-2": 1e-6 * seconds}  # fmt: skip
+    least = {
+        "degC": 273.15,
+        "mm": 4e-4 * seconds,
+        "J m-2": 1e3 * seconds,
+        "MJ m-2": 1e-3 * seconds,
+        "kgC m-2": 1e-6 * seconds,
+    }
     return max(abs(value), least.get(unit, 1.0))
 
 

@@ -13,8 +13,18 @@ from analysis import experiments, protocol, reproduce, runs
 from analysis.experiments import Job
 from cleanrl_style.ppo_gated import Args
 
-COUNTS = {"main": 37, "fixed": 25, "site": 45, "thaw": 12, "balanced": 20, "controls": 20, "variants": 40,
-          "mechanisms": 2, "single": 6, "difficulty": 3}
+COUNTS = {
+    "main": 37,
+    "fixed": 25,
+    "site": 45,
+    "thaw": 12,
+    "balanced": 20,
+    "controls": 20,
+    "variants": 40,
+    "mechanisms": 2,
+    "single": 6,
+    "difficulty": 3,
+}
 
 
 def test_experiments():
@@ -24,20 +34,34 @@ def test_experiments():
     assert len({job.command for job in jobs}) == len(jobs)
     # heuristics first, then a seed of every method before the next
     assert [(job.script, job.flags["seed"]) for job in jobs[6:10]] == [
-        ("eupg_var_lambda", 1), ("ppo_gated", 1), ("ppo_curriculum", 1), ("eupg_var_lambda", 2)]
+        ("eupg_var_lambda", 1),
+        ("ppo_gated", 1),
+        ("ppo_curriculum", 1),
+        ("eupg_var_lambda", 2),
+    ]
     assert sum(job.steps for job in jobs if job.experiment == "main") == 30 * 300_000
     assert len(experiments.jobs(["fixed", "site"], [2])) == 5 + 9
 
 
 def test_a_job_knows_its_run():
     job = next(job for job in experiments.jobs(["site"]) if job.flags.get("preference") == 0.25)
-    assert job.command == ("python cleanrl_style/eupg_fixed_lambda.py --seed 1 --vectorization lockstep "
-                           "--preference 0.25 --mode site-specific --site-seed 1")
+    assert job.command == (
+        "python cleanrl_style/eupg_fixed_lambda.py --seed 1 --vectorization lockstep "
+        "--preference 0.25 --mode site-specific --site-seed 1"
+    )
     assert (job.env_id, job.steps) == ("boreal-site-specific-v0", 100_000)
-    config = {"script": "eupg_fixed_lambda",
-              "arguments": {"seed": 1, "env_id": "boreal-site-specific-v0", "vectorization": "lockstep",
-                            "preference": 0.25, "mode": "site-specific", "site_seed": 1},
-              "not_default": {"vectorization": "lockstep", "preference": 0.25, "site_seed": 1}}
+    config = {
+        "script": "eupg_fixed_lambda",
+        "arguments": {
+            "seed": 1,
+            "env_id": "boreal-site-specific-v0",
+            "vectorization": "lockstep",
+            "preference": 0.25,
+            "mode": "site-specific",
+            "site_seed": 1,
+        },
+        "not_default": {"vectorization": "lockstep", "preference": 0.25, "site_seed": 1},
+    }
     assert job.made(config)
     assert not job.made(config | {"arguments": config["arguments"] | {"seed": 2}})
     assert not job.made(config | {"not_default": {"learning_rate": 0.1}})
@@ -46,8 +70,7 @@ def test_a_job_knows_its_run():
 
 def test_a_variant_knows_its_run():
     job = next(job for job in experiments.jobs(["variants"]) if "reward_scales" in job.flags)
-    assert job.command == ("python cleanrl_style/ppo_gated.py --seed 1 --vectorization lockstep "
-                           "--reward-scales 1.43 1")
+    assert job.command == ("python cleanrl_style/ppo_gated.py --seed 1 --vectorization lockstep --reward-scales 1.43 1")
     args = Args(vectorization="lockstep", reward_scales=(1.43, 1.0))
     protocol.resolve(args)
     config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}
@@ -187,6 +210,7 @@ def test_stopping_ends_the_children(fake, monkeypatch):
 
 def test_finished_runs_are_recognised(tmp_path):
     configs = reproduce.finished_configs(TINY_RUNS, Path(tmp_path))
-    done = {(job.script, job.flags.get("seed")) for job in experiments.jobs()
-            if any(job.made(config) for config in configs)}
+    done = {
+        (job.script, job.flags.get("seed")) for job in experiments.jobs() if any(job.made(config) for config in configs)
+    }
     assert done == {("ppo_curriculum", 1), ("zero_change", None)}

@@ -33,9 +33,14 @@ def start(script, folder, *arguments, **environment):
     command = [sys.executable, ROOT / "cleanrl_style" / f"{script}.py", "--run-dir", folder, *arguments]
     limit = environment.pop("file_size", None)
     return subprocess.Popen(
-        [str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONPATH": path, **environment}, start_new_session=True,
-        preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))))
+        [str(part) for part in command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path, **environment},
+        start_new_session=True,
+        preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))),
+    )
 
 
 def finish(process, timeout=120):
@@ -83,12 +88,23 @@ def assert_same_bytes(folder, other):
         assert (folder / name).read_bytes() == (other / name).read_bytes(), name
 
 
-@pytest.mark.parametrize("script, common, moments", [
-    ("ppo_curriculum", TOY, "any"), ("ppo_curriculum", BOREAL_ASYNC, "checkpoint"),
-    ("ppo_gated", BOREAL, "checkpoint"), ("eupg_var_lambda", BOREAL, "any"),
-    ("eupg_fixed_lambda", TOY, "any checkpoint"),
-], ids=["ppo_curriculum-toy", "ppo_curriculum-async", "ppo_gated-lockstep", "eupg_var_lambda-lockstep",
-        "eupg_fixed_lambda-toy"])
+@pytest.mark.parametrize(
+    "script, common, moments",
+    [
+        ("ppo_curriculum", TOY, "any"),
+        ("ppo_curriculum", BOREAL_ASYNC, "checkpoint"),
+        ("ppo_gated", BOREAL, "checkpoint"),
+        ("eupg_var_lambda", BOREAL, "any"),
+        ("eupg_fixed_lambda", TOY, "any checkpoint"),
+    ],
+    ids=[
+        "ppo_curriculum-toy",
+        "ppo_curriculum-async",
+        "ppo_gated-lockstep",
+        "eupg_var_lambda-lockstep",
+        "eupg_fixed_lambda-toy",
+    ],
+)
 def test_killed_and_resumed_is_as_never_killed(script, common, moments, tmp_path):
     """Killed at any moment (before anything is written, in training, in the evaluation), and after a checkpoint."""
     given, killed, whole = arguments(script, common), tmp_path / "killed", tmp_path / "whole"
@@ -152,11 +168,15 @@ def resume(folder):
     run_script("cleanrl_style/ppo_gated.py", "--run-dir", folder, *arguments("ppo_gated", TOY))
 
 
-@pytest.mark.parametrize("harm", [
-    lambda data: b"",
-    lambda data: data[:1000],
-    lambda data: data[: len(data) // 2] + bytes([data[len(data) // 2] ^ 1]) + data[len(data) // 2 + 1:],
-], ids=["empty", "cut", "one bit"])
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda data: b"",
+        lambda data: data[:1000],
+        lambda data: data[: len(data) // 2] + bytes([data[len(data) // 2] ^ 1]) + data[len(data) // 2 + 1 :],
+    ],
+    ids=["empty", "cut", "one bit"],
+)
 def test_a_damaged_checkpoint_is_refused(interrupted, tmp_path, harm):
     folder = copy(interrupted, tmp_path)
     checkpoint = folder / "checkpoint.pt"
@@ -199,11 +219,14 @@ def test_a_full_disk_leaves_the_old_checkpoint(interrupted, tmp_path):
     assert not list(folder.glob("*.tmp"))
 
 
-@pytest.mark.parametrize("where, error", [
-    ("step 20", "FloatingPointError: the ground is 100% gone"),
-    ("mask 30", "NoPickle: the mask slipped"),
-    ("nan 20", "FloatingPointError: step gave the reward [nan nan]"),
-])
+@pytest.mark.parametrize(
+    "where, error",
+    [
+        ("step 20", "FloatingPointError: the ground is 100% gone"),
+        ("mask 30", "NoPickle: the mask slipped"),
+        ("nan 20", "FloatingPointError: step gave the reward [nan nan]"),
+    ],
+)
 def test_an_error_in_a_worker_is_shown_and_ends_the_run(interrupted, tmp_path, where, error):
     folder = copy(interrupted, tmp_path)
     old = (folder / "checkpoint.pt").read_bytes()
@@ -233,8 +256,22 @@ def test_a_killed_worker_ends_the_run(interrupted, tmp_path):
 
 
 def test_an_environment_without_a_state_starts_over(tmp_path, capsys):
-    command = ("cleanrl_style/eupg_var_lambda.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path, "--num-envs",
-               2, "--total-timesteps", 40, "--eval-episodes", 1, "--eval-weights", 0, 1)
+    command = (
+        "cleanrl_style/eupg_var_lambda.py",
+        "--env-id",
+        "toy_env:toy-v0",
+        "--run-dir",
+        tmp_path,
+        "--num-envs",
+        2,
+        "--total-timesteps",
+        40,
+        "--eval-episodes",
+        1,
+        "--eval-weights",
+        0,
+        1,
+    )
     run_script(*command)
     whole = {path: path.read_bytes() for path in tmp_path.iterdir() if path.name != "timing.csv"}
     (tmp_path / "evaluation.csv").unlink()

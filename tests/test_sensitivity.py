@@ -66,12 +66,18 @@ def returns_table(values: dict) -> pd.DataFrame:
 
 
 def test_measures_and_effects_of_a_hand_case():
-    table = returns_table({
-        ("default", "default"): (0, 1, 2, 3),
-        ("straight", "low"): (0, 1, 2, 3), ("straight", "middle"): (2, 3, 4, 5), ("straight", "high"): (4, 5, 6, 7),
-        ("bent", "low"): (0, 1, 2, 3), ("bent", "middle"): (2, 3, 4, 5), ("bent", "high"): (0, 5, 2, 3),
-        ("at its limit", "low"): (1, 1, 1, 1),
-    })  # fmt: skip
+    table = returns_table(
+        {
+            ("default", "default"): (0, 1, 2, 3),
+            ("straight", "low"): (0, 1, 2, 3),
+            ("straight", "middle"): (2, 3, 4, 5),
+            ("straight", "high"): (4, 5, 6, 7),
+            ("bent", "low"): (0, 1, 2, 3),
+            ("bent", "middle"): (2, 3, 4, 5),
+            ("bent", "high"): (0, 5, 2, 3),
+            ("at its limit", "low"): (1, 1, 1, 1),
+        }
+    )
     default = sensitivity.measures(table).loc[("default", "default")]
     assert (default.zero_carbon, default.gain_carbon, default.species_carbon) == (0, 2, -1)
     assert (default.zero_thaw, default.gain_thaw, default.species_thaw) == (0, -2, 1)

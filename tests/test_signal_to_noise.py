@@ -12,7 +12,7 @@ TINY = Design(sites=2, pasts=2, futures=2, years=(0, 2))
 def toy(sites=400, pasts=4, futures=4):
     """Values of two actions: an effect of 0.5 and noises of 3 (site), 2 (past) and 1 (future, each action's own)."""
     generator = np.random.default_rng(0)
-    shared = (3 * generator.standard_normal((sites, 1, 1)) + 2 * generator.standard_normal((sites, pasts, 1)))
+    shared = 3 * generator.standard_normal((sites, 1, 1)) + 2 * generator.standard_normal((sites, pasts, 1))
     first, second = (shared + generator.standard_normal((sites, pasts, futures)) for _ in range(2))
     return first + 0.5, second
 

@@ -111,8 +111,10 @@ def test_products_decay_with_their_half_life():
 
 def test_first_stocks_are_as_given():
     given = {"density_stems_ha": 700.0, "conifer_fraction": 0.25, "biomass_kgc_m2": 6.0, "soil_kgc_m2": 9.0}
-    still = {name: 0.0 for name in ("recruitment_rate", "natural_mortality", "insect_base_probability",
-                                    "density_dependent_mortality")}  # fmt: skip
+    still = {
+        name: 0.0
+        for name in ("recruitment_rate", "natural_mortality", "insect_base_probability", "density_dependent_mortality")
+    }
     table = simulate(still, initial={**given, "organic_layer_m": 0.12}, mechanisms={"fire": False})
     assert table.density_stems_ha[0] == pytest.approx(700.0)
     assert table.conifer_fraction[0] == pytest.approx(0.25)
@@ -309,10 +311,12 @@ FORCINGS = {
     "missing column": (lambda: observed().drop(columns="longwave_w_m2"), r"longwave_w_m2 is missing; needed: air_temp"),
     "missing row": (lambda: observed().drop(pd.Timestamp("2019-03-05 08:00")), r"not regular at 2019-03-05 12:00"),
     "missing week before March": (
-        lambda: without(observed(120), "2019-02-20", "2019-02-28"), r"not regular at 2019-03-01"
+        lambda: without(observed(120), "2019-02-20", "2019-02-28"),
+        r"not regular at 2019-03-01",
     ),
     "missing weeks of a leap year": (
-        lambda: without(observed(120, start="2020-01-01"), "2020-02-10", "2020-02-29"), r"not regular at 2020-03-01"
+        lambda: without(observed(120, start="2020-01-01"), "2020-02-10", "2020-02-29"),
+        r"not regular at 2020-03-01",
     ),
     "duplicate times": (lambda: pd.concat([observed().iloc[:1]] * 6), r"2019-01-01 00:00"),
     "descending times": (lambda: observed(10).iloc[::-1], r"forcing"),
@@ -324,7 +328,7 @@ FORCINGS = {
     "no rows": (lambda: observed().iloc[:0], r"0 rows"),
     "an array": (lambda: observed().to_numpy(), r"DataFrame with a DatetimeIndex"),
     "no times": (lambda: observed().reset_index(drop=True), r"DataFrame with a DatetimeIndex"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("make", "message"), FORCINGS.values(), ids=FORCINGS)
@@ -387,7 +391,7 @@ BAD = {
     "half-life 0": ({"hwp_half_life_years": 0}, r"hwp_half_life_years: .*number.* is allowed, got 0"),
     "half-life of text": ({"hwp_half_life_years": "long"}, r"hwp_half_life_years: .*number.* is allowed, got 'long'"),
     "class of saplings": ({"harvest_min_class": "sapling"}, r"harvest_min_class 'sapling': allowed are young"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD.values(), ids=BAD)
@@ -433,8 +437,13 @@ BANDS = {
 def mature_stands():
     number = 32
     stands = sim.Stands(number, time_step_minutes=60, mechanisms={"fire": False})
-    mature = {"density_stems_ha": 1000.0, "conifer_fraction": 0.6, "biomass_kgc_m2": 7.0, "soil_kgc_m2": 8.0,
-              "oldest_age_years": 110.0}  # fmt: skip
+    mature = {
+        "density_stems_ha": 1000.0,
+        "conifer_fraction": 0.6,
+        "biomass_kgc_m2": 7.0,
+        "soil_kgc_m2": 8.0,
+        "oldest_age_years": 110.0,
+    }
     sites = [sim.sample_site(k) for k in range(number)]
     stands.start(
         np.arange(number), sites, [sim.episode_seeds(k) for k in range(number)], dict.fromkeys(range(number), mature)

@@ -1,4 +1,5 @@
 """The tower records: units, known values of the year, and refusal of gaps."""
+
 from dataclasses import replace
 
 import numpy as np

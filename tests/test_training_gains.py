@@ -27,8 +27,15 @@ def test_gains_are_differences_on_the_same_episode():
     run = runs.read_run(TINY_RUNS / "curriculum")
     stream = {name: run.arguments[name] for name in training_gains.STREAM}
     episodes = run.episodes.iloc[[1, 3]]
-    nothing = pd.DataFrame({**stream, "env": episodes.env, "global_step": episodes.global_step,
-                            "carbon_return": [1.0, 2.0], "thaw_return": [0.5, -0.5]})  # fmt: skip
+    nothing = pd.DataFrame(
+        {
+            **stream,
+            "env": episodes.env,
+            "global_step": episodes.global_step,
+            "carbon_return": [1.0, 2.0],
+            "thaw_return": [0.5, -0.5],
+        }
+    )
     gains = training_gains.gains(run, nothing)
     assert gains.global_step.tolist() == episodes.global_step.tolist()
     np.testing.assert_allclose(gains.carbon_gain, episodes.carbon_return.to_numpy() - [1.0, 2.0])
@@ -52,8 +59,16 @@ def test_a_stream_that_is_there_is_not_played_again(tmp_path, monkeypatch):
 
     def play(num_envs, seed, steps, every):
         played.append(seed)
-        return pd.DataFrame({"num_envs": num_envs, "seed": seed, "env": [0], "global_step": [50],
-                             "carbon_return": [0.25], "thaw_return": [-3.0]})  # fmt: skip
+        return pd.DataFrame(
+            {
+                "num_envs": num_envs,
+                "seed": seed,
+                "env": [0],
+                "global_step": [50],
+                "carbon_return": [0.25],
+                "thaw_return": [-3.0],
+            }
+        )
 
     monkeypatch.setattr(training_gains, "play", play)
     training_gains.main(training_gains.Args())

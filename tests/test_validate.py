@@ -119,10 +119,15 @@ def test_energy_offset_by_hand():
 
 def test_temperature_within_the_organic_layer():
     """10 W/m2 through 0.11 m of 0.2 (thawed) or 0.4 W/m/K (frozen)."""
-    days = pd.DataFrame({
-        "soil_top_temperature_c": [2.0, -4.0], "ground_heat_mj_m2": [0.864, -0.864], "organic_layer_m": 0.30,
-        "ground_temperature_c": [12.0, -15.0], "surface_soil_temperature_c": [1.0, -3.0],
-    })  # fmt: skip
+    days = pd.DataFrame(
+        {
+            "soil_top_temperature_c": [2.0, -4.0],
+            "ground_heat_mj_m2": [0.864, -0.864],
+            "organic_layer_m": 0.30,
+            "ground_temperature_c": [12.0, -15.0],
+            "surface_soil_temperature_c": [1.0, -3.0],
+        }
+    )
     np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.19), [2.0 + 5.5, -4.0 - 2.75])
 
 

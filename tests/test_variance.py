@@ -19,8 +19,15 @@ def test_additive_table_has_no_interactions():
 
 
 def test_components_of_a_synthetic_table():
-    true = {"site": 9.0, "weather": 1.0, "policy": 4.0, "site x weather": 0.5, "site x policy": 2.0,
-            "weather x policy": 0.25, "site x weather x policy": 1.0}  # fmt: skip
+    true = {
+        "site": 9.0,
+        "weather": 1.0,
+        "policy": 4.0,
+        "site x weather": 0.5,
+        "site x policy": 2.0,
+        "weather x policy": 0.25,
+        "site x weather x policy": 1.0,
+    }
     sizes = dict(zip(variance.FACTORS, (12, 10, 11), strict=True))
     generator = np.random.default_rng(0)
     estimates = []

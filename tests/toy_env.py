@@ -45,7 +45,7 @@ class ToyEnv(gym.Env):
     def _observation(self):
         observation = np.zeros(self.size, np.float32)
         observation[:3] = self.preference, self.steps / LENGTH, self.full
-        observation[self.size - len(self.site):] = self.site
+        observation[self.size - len(self.site) :] = self.site
         return observation
 
     def action_masks(self):

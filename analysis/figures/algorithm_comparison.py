@@ -21,14 +21,17 @@ from analysis.figures.common import (
 from analysis.results import TITLES
 
 SIZE = (7, 5.6)
-CAPTION = (f"Returns are sums over 50 years. (a) {SEEDS_95}. (b) thin bars: standard deviation over episodes, as in "
-           "the paper; dots: seeds. (c) a point a weight, mean over seeds. (d) large: mean over seeds, small: seeds.")
+CAPTION = (
+    f"Returns are sums over 50 years. (a) {SEEDS_95}. (b) thin bars: standard deviation over episodes, as in "
+    "the paper; dots: seeds. (c) a point a weight, mean over seeds. (d) large: mean over seeds, small: seeds."
+)
 
 
 def draw(figure, results) -> None:
     """Learning curves, evaluation, trade-offs of all, the curriculum's trade-off."""
     learning, bars, trade_offs, curriculum = panels(
-        figure, 2, 2, ["training", "evaluation", "trade-offs", "Curriculum PPO by weight"])  # fmt: skip
+        figure, 2, 2, ["training", "evaluation", "trade-offs", "Curriculum PPO by weight"]
+    )
     for script, title in methods(learning, results):
         learning_curve(learning, results.of("main", script), "scalarized_return", COLOURS[script], title)
     finish(learning, ylabel="scalarised return", **STEPS)
@@ -48,8 +51,14 @@ def draw(figure, results) -> None:
     for script in (*METHODS, *HEURISTICS):
         if not wanting(trade_offs, results, "main", script):
             front = mean_front(results.of("main", script))
-            trade_offs.plot(front.thaw_return, front.carbon_return, MARKERS[script], color=COLOURS[script],
-                            label=TITLES[script], markersize=5)  # fmt: skip
+            trade_offs.plot(
+                front.thaw_return,
+                front.carbon_return,
+                MARKERS[script],
+                color=COLOURS[script],
+                label=TITLES[script],
+                markersize=5,
+            )
     finish(trade_offs, **RETURNS)
 
     if not wanting(curriculum, results, "main", "ppo_curriculum"):

@@ -13,10 +13,20 @@ from analysis.experiments import METHODS
 from analysis.results import TITLES
 
 STYLE = {
-    "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "legend.fontsize": 7, "xtick.labelsize": 7,
-    "ytick.labelsize": 7, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
-    "lines.linewidth": 1.3, "axes.unicode_minus": True, "svg.hashsalt": "borearl", "pdf.fonttype": 42,
-}  # fmt: skip
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "legend.fontsize": 7,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+    "axes.unicode_minus": True,
+    "svg.hashsalt": "borearl",
+    "pdf.fonttype": 42,
+}
 # Okabe and Ito (2008): told apart with every kind of colour vision; the markers tell them apart in grey.
 COLOURS = {
     "eupg_var_lambda": "#CC79A7",
@@ -29,9 +39,17 @@ COLOURS = {
     "conifer_restoration": "#0072B2",
     "random_valid": "#999999",
 }
-MARKERS = {"eupg_var_lambda": "s", "ppo_gated": "^", "ppo_curriculum": "o", "eupg_fixed_lambda": "D",
-           "zero_change": "x", "plus_100": "+", "target_density": "v", "conifer_restoration": "*",
-           "random_valid": "1"}  # fmt: skip
+MARKERS = {
+    "eupg_var_lambda": "s",
+    "ppo_gated": "^",
+    "ppo_curriculum": "o",
+    "eupg_fixed_lambda": "D",
+    "zero_change": "x",
+    "plus_100": "+",
+    "target_density": "v",
+    "conifer_restoration": "*",
+    "random_valid": "1",
+}
 WEIGHT_COLOURS = "viridis"
 BINS = 40  # of a learning curve
 SEEDS_95 = "curves and bands: interquartile mean over training seeds and its 95 % interval (none with one seed)"
@@ -61,8 +79,17 @@ def letter(axes, titles) -> None:
 def no_data(ax, *commands: str) -> None:
     """Say in an empty panel which command makes its data."""
     lines = [line for command in commands for line in textwrap.wrap(command, 42, subsequent_indent="    ")]
-    ax.text(0.5, 0.5, "\n".join(["no run yet:", *lines]), transform=ax.transAxes, ha="center", va="center",
-            fontsize=6, family="monospace", wrap=True)  # fmt: skip
+    ax.text(
+        0.5,
+        0.5,
+        "\n".join(["no run yet:", *lines]),
+        transform=ax.transAxes,
+        ha="center",
+        va="center",
+        fontsize=6,
+        family="monospace",
+        wrap=True,
+    )
     ax.set_xticks([])
     ax.set_yticks([])
 
@@ -89,8 +116,10 @@ def finish(ax, **labels) -> None:
             axis.get_major_formatter().set_useOffset(False)
     if wanted:
         experiments = " ".join(dict.fromkeys(job.experiment for job in wanted))
-        note = [*textwrap.wrap("no run yet: " + ", ".join(job.script for job in wanted), 60),
-                f"(python analysis/reproduce.py --only {experiments})"]  # fmt: skip
+        note = [
+            *textwrap.wrap("no run yet: " + ", ".join(job.script for job in wanted), 60),
+            f"(python analysis/reproduce.py --only {experiments})",
+        ]
         ax.text(0.99, 0.01, "\n".join(note), transform=ax.transAxes, ha="right", va="bottom", fontsize=5)
 
 
@@ -138,6 +167,7 @@ def learning_curve(ax, replicates, column: str, colour, label: str, **kwargs) ->
 
 def by_year(replicates, variable: str) -> np.ndarray:
     """A column of the annual record, averaged over the kept weights, (replicates, years)."""
+
     def of_one(one):
         years = one.years([variable])
         return years.groupby("year")["mean"].mean().to_numpy()
@@ -153,6 +183,7 @@ def year_curve(ax, replicates, variable: str, colour, label: str, style="-") -> 
 
 def by_season(replicates, bins: int = 8) -> tuple[np.ndarray, np.ndarray]:
     """Thaw return against growing season: means in bins with equally many episodes, (points), (replicates, points)."""
+
     def of_one(one):
         groups = pd.qcut(one.evaluation.growing_season_days, bins, labels=False, duplicates="drop")
         return one.evaluation.groupby(groups)[["growing_season_days", "thaw_return"]].mean()
@@ -188,17 +219,41 @@ def weight_points(ax, replicates, marker="o"):
     """Every seed's mean returns at each weight, small, and their mean, large, coloured by the weight."""
     for one in replicates if len(replicates) > 1 else ():
         front = metrics.mean_returns(one.evaluation)
-        ax.scatter(front.thaw_return, front.carbon_return, c=front.index, cmap=WEIGHT_COLOURS, vmin=0, vmax=1, s=5,
-                   alpha=0.5, linewidths=0)  # fmt: skip
+        ax.scatter(
+            front.thaw_return,
+            front.carbon_return,
+            c=front.index,
+            cmap=WEIGHT_COLOURS,
+            vmin=0,
+            vmax=1,
+            s=5,
+            alpha=0.5,
+            linewidths=0,
+        )
     front = mean_front(replicates)
     best = front[[tuple(point) in set(map(tuple, metrics.nondominated(front))) for point in front.to_numpy()]]
     best = best.sort_values("thaw_return")
     ax.plot(best.thaw_return, best.carbon_return, color="#888888", linewidth=0.8, zorder=1)
-    points = ax.scatter(front.thaw_return, front.carbon_return, c=front.index, cmap=WEIGHT_COLOURS, vmin=0, vmax=1,
-                        s=28, marker=marker, edgecolors="black", linewidths=0.5)  # fmt: skip
+    points = ax.scatter(
+        front.thaw_return,
+        front.carbon_return,
+        c=front.index,
+        cmap=WEIGHT_COLOURS,
+        vmin=0,
+        vmax=1,
+        s=28,
+        marker=marker,
+        edgecolors="black",
+        linewidths=0.5,
+    )
     for weight in (front.index[0], front.index[-1]):
-        ax.annotate(f"{weight:g}", front.loc[weight, ["thaw_return", "carbon_return"]], xytext=(4, 4),
-                    textcoords="offset points", fontsize=6)  # fmt: skip
+        ax.annotate(
+            f"{weight:g}",
+            front.loc[weight, ["thaw_return", "carbon_return"]],
+            xytext=(4, 4),
+            textcoords="offset points",
+            fontsize=6,
+        )
     return points
 
 

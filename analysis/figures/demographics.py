@@ -5,11 +5,18 @@ import numpy as np
 from analysis.figures.common import COLOURS, SEEDS_95, finish, legend, letter, methods, year_curve
 
 SIZE = (7, 7)
-CAPTION = (f"(a-e) evaluation, mean over the weights 0, 0.5 and 1; solid: conifers, dashed: deciduous; {SEEDS_95}. "
-           "(f) last fifth of the training episodes of all seeds. (g) last year: median and 80 % of the episodes, a "
-           "line a weight and seed.")  # fmt: skip
-CLASSES = {"seedling": "seedlings, 0-5 years", "sapling": "saplings, 6-20", "young": "young, 21-40",
-           "mature": "mature, 41-100", "old": "old, 101+"}  # fmt: skip
+CAPTION = (
+    f"(a-e) evaluation, mean over the weights 0, 0.5 and 1; solid: conifers, dashed: deciduous; {SEEDS_95}. "
+    "(f) last fifth of the training episodes of all seeds. (g) last year: median and 80 % of the episodes, a "
+    "line a weight and seed."
+)
+CLASSES = {
+    "seedling": "seedlings, 0-5 years",
+    "sapling": "saplings, 6-20",
+    "young": "young, 21-40",
+    "mature": "mature, 41-100",
+    "old": "old, 101+",
+}
 
 
 def draw(figure, results) -> None:

@@ -17,9 +17,11 @@ from analysis.figures.common import (
 from analysis.figures.learning_curves import gain_curve
 
 SIZE = (7.2, 5.0)
-CAPTION = ("Fixed λ EUPG, one agent a weight; sums over 50 years; gains: less zero change on the same episodes; "
-           f"{SEEDS_95}; (b, f) over sites. (f) agents of one objective alone, its gain in training; dashed: with "
-           "--baseline others.")  # fmt: skip
+CAPTION = (
+    "Fixed λ EUPG, one agent a weight; sums over 50 years; gains: less zero change on the same episodes; "
+    f"{SEEDS_95}; (b, f) over sites. (f) agents of one objective alone, its gain in training; dashed: with "
+    "--baseline others."
+)
 GAIN = "scalarized_gain"
 PANELS = {  # experiment, column of the training episodes, label, title
     "a": ("fixed", "scalarized_return", "scalarised return", "all sites"),
@@ -58,14 +60,20 @@ def site_gains(ax, results, colours) -> None:
     for script in ("eupg_fixed_lambda", "zero_change"):
         wanting(ax, results, "site", script)
     for style, flags in BASELINES.items():
-        runs = [run for one in results.of("site", "eupg_fixed_lambda", **flags) for run in one.runs
-                if run.arguments["site_seed"] in zero]  # fmt: skip
+        runs = [
+            run
+            for one in results.of("site", "eupg_fixed_lambda", **flags)
+            for run in one.runs
+            if run.arguments["site_seed"] in zero
+        ]
         for weight, objective in ((0.0, "thaw_return"), (1.0, "carbon_return")):
             of_weight = [run for run in runs if run.arguments["preference"] == weight]
             if not of_weight:
                 continue
             steps = max(run.arguments["total_timesteps"] for run in of_weight)
-            tables = [run.episodes.assign(gain=run.episodes[objective]
-                                          - zero[run.arguments["site_seed"]][objective].mean()) for run in of_weight]
+            tables = [
+                run.episodes.assign(gain=run.episodes[objective] - zero[run.arguments["site_seed"]][objective].mean())
+                for run in of_weight
+            ]
             training_curve(ax, tables, "gain", steps, colours(0.9 * weight), None, style=style)
     finish(ax, ylabel="gain in the own objective", **STEPS)

@@ -20,10 +20,12 @@ from analysis.studies.training_gains import gains
 
 SIZE = (7.2, 4.8)
 PARTS = 20  # of the training; fewer than of a learning curve, as a part of the episodes has a gain
-CAPTION = ("Sums over 50 years: (a-c) returns of training episodes, (d-f) less those of zero change on the same "
-           f"episodes; {SEEDS_95}. Dashed, dotted: fixed strategies, their mean gain on the evaluation's sites, which "
-           "are others and milder, in (a-c) added to zero change's mean return in training; the best constant plan is "
-           "that of each weight.")  # fmt: skip
+CAPTION = (
+    "Sums over 50 years: (a-c) returns of training episodes, (d-f) less those of zero change on the same "
+    f"episodes; {SEEDS_95}. Dashed, dotted: fixed strategies, their mean gain on the evaluation's sites, which "
+    "are others and milder, in (a-c) added to zero change's mean return in training; the best constant plan is "
+    "that of each weight."
+)
 BEST = "Best constant plan"
 QUANTITIES = {"carbon": "carbon", "thaw": "thaw", "scalarized": "scalarised"}
 
@@ -64,8 +66,9 @@ def baselines(results, nothing) -> list[tuple]:
     nothing : the study's table. The evaluation's sites are few, and returns differ between sites far more than between
     strategies, so that a strategy's level among the training's returns is its gain over zero change's mean there.
     """
-    evaluated = [(TITLES[script], COLOURS[script], one.evaluation) for script in HEURISTICS
-                 for one in results.of("main", script)]  # fmt: skip
+    evaluated = [
+        (TITLES[script], COLOURS[script], one.evaluation) for script in HEURISTICS for one in results.of("main", script)
+    ]
     zero = next((evaluation for title, _, evaluation in evaluated if title == TITLES["zero_change"]), None)
     if zero is None:
         return []
@@ -80,8 +83,17 @@ def baselines(results, nothing) -> list[tuple]:
     levels = []
     for title, colour, evaluation in evaluated:
         gained = metrics.gains(evaluation, zero)
-        gain = {"carbon": gained.carbon_return.mean(), "thaw": gained.thaw_return.mean(),
-                "scalarized": metrics.mean_scalarized(gained)}  # fmt: skip
-        levels.append((title, colour, {f"{name}_gain": gain[name] for name in gain}
-                       | {f"{name}_return": start[name] + gain[name] for name in gain}))
+        gain = {
+            "carbon": gained.carbon_return.mean(),
+            "thaw": gained.thaw_return.mean(),
+            "scalarized": metrics.mean_scalarized(gained),
+        }
+        levels.append(
+            (
+                title,
+                colour,
+                {f"{name}_gain": gain[name] for name in gain}
+                | {f"{name}_return": start[name] + gain[name] for name in gain},
+            )
+        )
     return levels

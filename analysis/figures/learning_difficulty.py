@@ -14,8 +14,13 @@ CAPTION = (
     "action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside. (d) half of the episodes "
     "have either action; dashed line: those of a training run."
 )
-COMPONENTS = {"site": "#0072B2", "weather": "#56B4E9", "site x weather": "#999999", "policy": "#D55E00",
-              "site x policy": "#E69F00"}  # fmt: skip
+COMPONENTS = {
+    "site": "#0072B2",
+    "weather": "#56B4E9",
+    "site x weather": "#999999",
+    "policy": "#D55E00",
+    "site x policy": "#E69F00",
+}
 REST = "#DDDDDD"
 OF = {"carbon": ("#009E73", "o"), "thaw": ("#0072B2", "s")}
 TRAINING_EPISODES = 6000
@@ -24,8 +29,16 @@ TRAINING_EPISODES = 6000
 def draw(figure, results) -> None:
     """Shares of the variance; effect and noise; the effect's course; episodes needed."""
     variance, noise, course, needed = panels(
-        figure, 2, 2, ["what varies", "an action's effect and the noise", "planting conifers: when the effect comes",
-                       "episodes to tell two actions apart"])  # fmt: skip
+        figure,
+        2,
+        2,
+        [
+            "what varies",
+            "an action's effect and the noise",
+            "planting conifers: when the effect comes",
+            "episodes to tell two actions apart",
+        ],
+    )
     draw_variance(variance, variance_components(results))
     table, years = results.study("signal_to_noise"), results.study("signal_to_noise_years")
     if table is None or years is None:
@@ -77,8 +90,15 @@ def draw_noise(ax, cases) -> None:
         ax.plot(np.maximum(ends, 1e-3), [k, k], color=colour, linewidth=1.5)
         ax.plot(abs(case.effect), k, marker, color=colour, markersize=5, label="effect" if k == 0 else None)
         for column, symbol, label in (("site_noise", "<", "site baseline"), ("noise", "x", "no baseline")):
-            ax.plot(case[column], k, symbol, color="black", markersize=5, markerfacecolor="none",
-                    label=f"noise, {label}" if k == 0 else None)  # fmt: skip
+            ax.plot(
+                case[column],
+                k,
+                symbol,
+                color="black",
+                markersize=5,
+                markerfacecolor="none",
+                label=f"noise, {label}" if k == 0 else None,
+            )
     ax.set_xlim(1e-3, 40)
     ax.set_xlabel("return to go")
     ax.legend(ncol=3, loc="upper center", bbox_to_anchor=(0.2, -0.2), fontsize=6)
@@ -88,8 +108,14 @@ def draw_course(ax, years) -> None:
     """The effect so far as a share of the whole, and how much later rewards weigh in an advantage."""
     for objective, (colour, marker) in OF.items():
         effect = years[(years.contrast == "plant conifers") & (years.objective == objective)].effect.to_numpy()
-        ax.plot(np.cumsum(effect) / effect.sum(), color=colour, marker=marker, markevery=5, markersize=3,
-                label=f"{objective}: effect so far")  # fmt: skip
+        ax.plot(
+            np.cumsum(effect) / effect.sum(),
+            color=colour,
+            marker=marker,
+            markevery=5,
+            markersize=3,
+            label=f"{objective}: effect so far",
+        )
     after = np.arange(len(effect))
     for name, style in (("discounted", ":"), ("GAE", "--")):
         weight = WEIGHTINGS[name] ** after
@@ -102,16 +128,26 @@ def draw_course(ax, years) -> None:
 def draw_needed(ax, cases) -> None:
     """Episodes without a baseline, with the site's, and with the site's in a generalised advantage."""
     rows = rows_of(ax)
-    kinds = (("return", "episodes", "x", "no baseline"), ("return", "site_episodes", "o", "site baseline"),
-             ("GAE", "site_episodes", "D", "site baseline, GAE"))  # fmt: skip
+    kinds = (
+        ("return", "episodes", "x", "no baseline"),
+        ("return", "site_episodes", "o", "site baseline"),
+        ("GAE", "site_episodes", "D", "site baseline, GAE"),
+    )
     for weighting, column, symbol, label in kinds:
         for k, row in enumerate(rows):
             case = cases.loc[(weighting, *row)]
             most = min(case[f"{column}_high"], 1e10)
             shift = 0.2 * (kinds.index((weighting, column, symbol, label)) - 1)
             ax.plot([case[f"{column}_low"], most], [k + shift] * 2, color=OF[row[1]][0], linewidth=1)
-            ax.plot(case[column], k + shift, symbol, color=OF[row[1]][0], markersize=4, markerfacecolor="white",
-                    label=label if k == 0 else None)  # fmt: skip
+            ax.plot(
+                case[column],
+                k + shift,
+                symbol,
+                color=OF[row[1]][0],
+                markersize=4,
+                markerfacecolor="white",
+                label=label if k == 0 else None,
+            )
     ax.axvline(TRAINING_EPISODES, linestyle="--", color="black", linewidth=0.8)
     ax.set_xlim(30, 1e9)
     ax.set_xlabel("episodes")

@@ -18,8 +18,10 @@ from analysis.figures.common import (
 )
 
 SIZE = (7, 5.4)
-CAPTION = ("(a) mean over the seeds in eighths of the training, the mark is the last. (b) a point a weight. "
-           f"(c) {SEEDS_95}. (d) mean over the weights 0, 0.5 and 1 and seeds; bars: sd over seeds.")  # fmt: skip
+CAPTION = (
+    "(a) mean over the seeds in eighths of the training, the mark is the last. (b) a point a weight. "
+    f"(c) {SEEDS_95}. (d) mean over the weights 0, 0.5 and 1 and seeds; bars: sd over seeds."
+)
 PARTS = 8  # of the training
 CLASSES = ("seedling", "sapling", "young", "mature", "old")
 
@@ -27,12 +29,15 @@ CLASSES = ("seedling", "sapling", "young", "mature", "old")
 def draw(figure, results) -> None:
     """Carbon against thaw twice, growing season, demographics."""
     training, evaluation, season, ages = panels(
-        figure, 2, 2, ["training", "evaluation", "growing season and thaw", "ages after 50 years"])  # fmt: skip
+        figure, 2, 2, ["training", "evaluation", "growing season and thaw", "ages after 50 years"]
+    )
     for script, title in methods(training, results):
         runs = [one.runs[0] for one in results.of("main", script)]
         steps = max(run.arguments["total_timesteps"] for run in runs)
-        thaw, carbon = (np.mean([binned(run.episodes, name, steps, bins=PARTS) for run in runs], axis=0)
-                        for name in ("thaw_return", "carbon_return"))  # fmt: skip
+        thaw, carbon = (
+            np.mean([binned(run.episodes, name, steps, bins=PARTS) for run in runs], axis=0)
+            for name in ("thaw_return", "carbon_return")
+        )
         known = np.flatnonzero(~np.isnan(thaw))
         training.plot(thaw[known], carbon[known], color=COLOURS[script], linewidth=0.7, alpha=0.6)
         training.plot(thaw[known[-1]], carbon[known[-1]], MARKERS[script], color=COLOURS[script], label=title)
@@ -43,12 +48,23 @@ def draw(figure, results) -> None:
     finish(evaluation, **RETURNS)
     season_curves(season, results)
     for k, (script, _) in enumerate(methods(ages, results)):
-        stems = np.array([sum(by_year(results.of("main", script), f"{species}_{age}_stems_ha")[:, -1]
-                              for species in ("conifer", "deciduous")) for age in CLASSES])  # fmt: skip
-        ages.bar(np.arange(len(CLASSES)) + 0.27 * (k - 1), stems.mean(axis=1), 0.25, yerr=stems.std(axis=1),
-                 color=COLOURS[script], error_kw={"linewidth": 0.6})  # fmt: skip
+        stems = np.array(
+            [
+                sum(
+                    by_year(results.of("main", script), f"{species}_{age}_stems_ha")[:, -1]
+                    for species in ("conifer", "deciduous")
+                )
+                for age in CLASSES
+            ]
+        )
+        ages.bar(
+            np.arange(len(CLASSES)) + 0.27 * (k - 1),
+            stems.mean(axis=1),
+            0.25,
+            yerr=stems.std(axis=1),
+            color=COLOURS[script],
+            error_kw={"linewidth": 0.6},
+        )
     ages.set_xticks(range(len(CLASSES)), CLASSES)
     finish(ages, ylabel="stems/ha")
     legend(figure, [training, season])
-
-

@@ -16,8 +16,16 @@ def draw(figure, results) -> None:
         thaw = sum(evaluations) / len(evaluations)
         features = [open_loop.site_features(sim.sample_site(int(seed))) for seed in thaw.index]
         x = [feature["boundary_above_air_k"] for feature in features]
-        sites.plot(x, thaw, MARKERS[script], color=COLOURS[script], label=title, markersize=3, alpha=0.7,
-                   markerfacecolor="none")  # fmt: skip
+        sites.plot(
+            x,
+            thaw,
+            MARKERS[script],
+            color=COLOURS[script],
+            label=title,
+            markersize=3,
+            alpha=0.7,
+            markerfacecolor="none",
+        )
     finish(sites, xlabel="temperature at 12 m less mean annual air (K)", ylabel="thaw return (50 years)")
     for script, title in methods(volatility, results):
         learning_curve(volatility, results.of("main", script), "thaw_return", COLOURS[script], title, statistic="std")

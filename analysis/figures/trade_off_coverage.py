@@ -4,8 +4,10 @@ from analysis.figures.common import RETURNS, finish, panels, wanting, weight_poi
 from analysis.results import TITLES
 
 SIZE = (7, 5.4)
-CAPTION = ("Evaluation, means over 100 episodes, sums over 50 years. Large: mean over seeds; small: seeds; line: the "
-           "points that none dominates.")  # fmt: skip
+CAPTION = (
+    "Evaluation, means over 100 episodes, sums over 50 years. Large: mean over seeds; small: seeds; line: the "
+    "points that none dominates."
+)
 PANELS = {"eupg_fixed_lambda": "fixed", "eupg_var_lambda": "main", "ppo_gated": "main", "ppo_curriculum": "main"}
 
 

@@ -9,8 +9,10 @@ CAPTION = f"Training episodes; {SEEDS_95}."
 def draw(figure, results) -> None:
     """Species and density, each the mean over an episode's 50 years."""
     species, density = panels(figure, 1, 2, ["species", "stem density"])
-    for ax, column, label in ((species, "mean_conifer_fraction", "conifer fraction, mean of 50 years"),
-                              (density, "mean_density", "stems/ha, mean of 50 years")):  # fmt: skip
+    for ax, column, label in (
+        (species, "mean_conifer_fraction", "conifer fraction, mean of 50 years"),
+        (density, "mean_density", "stems/ha, mean of 50 years"),
+    ):
         for script, title in methods(ax, results):
             learning_curve(ax, results.of("main", script), column, COLOURS[script], title)
         finish(ax, ylabel=label, **STEPS)

@@ -44,8 +44,12 @@ def less_random(evidence, evaluation: pd.DataFrame, objective: str) -> float:
 
 def learnt(evidence, weight: float) -> pd.Series:
     """An agent's own return less that of random valid actions, by training seed."""
-    return pd.Series({run.arguments["seed"]: less_random(evidence, run.evaluation, OBJECTIVE[weight])
-                      for run in evidence.agents("fixed", weight)})  # fmt: skip
+    return pd.Series(
+        {
+            run.arguments["seed"]: less_random(evidence, run.evaluation, OBJECTIVE[weight])
+            for run in evidence.agents("fixed", weight)
+        }
+    )
 
 
 def attainable(evidence, weight: float) -> float:
@@ -63,38 +67,59 @@ def share_learnt(evidence, weight: float) -> pd.Series:
 def rows_of(evidence, weight: float, papers: str) -> list[Row]:
     """The lines of an agent of one weight."""
     name = OBJECTIVE[weight].replace("_", " ")
-    return [Row(f"{name} less that of random actions, same sites", papers, seeds(learnt(evidence, weight))),
-            Row("the same of the best constant plan", "", Number(attainable(evidence, weight))),
-            Row("share of it learnt", papers, seeds(share_learnt(evidence, weight)))]
+    return [
+        Row(f"{name} less that of random actions, same sites", papers, seeds(learnt(evidence, weight))),
+        Row("the same of the best constant plan", "", Number(attainable(evidence, weight))),
+        Row("share of it learnt", papers, seeds(share_learnt(evidence, weight))),
+    ]
 
 
-@claim("Agents trained for carbon alone learn fast.", "Section 4.2, figure 2a", FIXED,
-       why="EUPG has no baseline: it weighs every action by the episode's whole return, much of which is the site's.",
-       note=LIMIT)
+@claim(
+    "Agents trained for carbon alone learn fast.",
+    "Section 4.2, figure 2a",
+    FIXED,
+    why="EUPG has no baseline: it weighs every action by the episode's whole return, much of which is the site's.",
+    note=LIMIT,
+)
 def carbon_is_learnt(evidence):
     share = seeds(share_learnt(evidence, CARBON))
     return finding(rows_of(evidence, CARBON, "rises"), above(share, PART, what="the share learnt"))
 
 
-@claim("Agents trained for thaw alone hardly improve.", "Section 4.2, figure 2a", FIXED,
-       why="Planting protects the ground too, and agents of this weight find it.", note=LIMIT)
+@claim(
+    "Agents trained for thaw alone hardly improve.",
+    "Section 4.2, figure 2a",
+    FIXED,
+    why="Planting protects the ground too, and agents of this weight find it.",
+    note=LIMIT,
+)
 def thaw_is_not_learnt(evidence):
     share = seeds(share_learnt(evidence, THAW))
     return finding(rows_of(evidence, THAW, "hardly rises"), below(share, PART, what="the share learnt"))
 
 
-@claim("Learning is asymmetric: of what can be gained, agents learn more in carbon than in thaw.",
-       "Abstract; section 4.2", FIXED)
+@claim(
+    "Learning is asymmetric: of what can be gained, agents learn more in carbon than in thaw.",
+    "Abstract; section 4.2",
+    FIXED,
+)
 def asymmetry(evidence):
     carbon, thaw = share_learnt(evidence, CARBON), share_learnt(evidence, THAW)
     apart = difference(carbon, thaw)
-    rows = [Row("share learnt of carbon", "", seeds(carbon)), Row("share learnt of thaw", "", seeds(thaw)),
-            Row("carbon less thaw", "above 0", apart)]
+    rows = [
+        Row("share learnt of carbon", "", seeds(carbon)),
+        Row("share learnt of thaw", "", seeds(thaw)),
+        Row("carbon less thaw", "above 0", apart),
+    ]
     return finding(rows, above(apart, what="the difference"))
 
 
-@claim("Single sites show the same: carbon is learnt, thaw is not.", "Section 4.2, figure 2b", SITES,
-       note="Fewer than five sites leave it undecided.")
+@claim(
+    "Single sites show the same: carbon is learnt, thaw is not.",
+    "Section 4.2, figure 2b",
+    SITES,
+    note="Fewer than five sites leave it undecided.",
+)
 def asymmetry_on_single_sites(evidence):
     def progress(weight):
         known = {}
@@ -110,13 +135,20 @@ def asymmetry_on_single_sites(evidence):
         raise Missing("agents of both weights on one site")
     apart = mean_of(carbon[common] - thaw[common], "sites")
     unit = "last less first tenth of training, in standard deviations of the first"
-    rows = [Row(f"carbon: {unit}", "rises", mean_of(carbon, "sites")),
-            Row(f"thaw: {unit}", "hardly rises", mean_of(thaw, "sites")), Row("carbon less thaw", "above 0", apart)]
-    rows += [Row(f"{name} over zero change in the evaluation, agents of {name} alone", "",
-                 optional(lambda weight=weight: mean_of(own_gains(evidence, weight), "sites")))
-             for name, weight in (("carbon", CARBON), ("thaw", THAW))]  # fmt: skip
-    answer = all_of(above(apart, what="the difference"),
-                    below(mean_of(thaw, "sites"), 1.0, what="thaw's progress"))  # fmt: skip
+    rows = [
+        Row(f"carbon: {unit}", "rises", mean_of(carbon, "sites")),
+        Row(f"thaw: {unit}", "hardly rises", mean_of(thaw, "sites")),
+        Row("carbon less thaw", "above 0", apart),
+    ]
+    rows += [
+        Row(
+            f"{name} over zero change in the evaluation, agents of {name} alone",
+            "",
+            optional(lambda weight=weight: mean_of(own_gains(evidence, weight), "sites")),
+        )
+        for name, weight in (("carbon", CARBON), ("thaw", THAW))
+    ]
+    answer = all_of(above(apart, what="the difference"), below(mean_of(thaw, "sites"), 1.0, what="thaw's progress"))
     return Finding(rows, UNDECIDED, answer.rule) if len(common) < FEWEST_SITES else finding(rows, answer)
 
 
@@ -133,80 +165,130 @@ def constant_gains(evidence, weight: float) -> pd.Series:
     return best_gains(evidence.study("constant_plans_of_sites"), OBJECTIVE[weight])
 
 
-@claim("Delay by itself keeps thaw from being learnt, where sites and weathers make no noise.", "Section 4.2 and 5 "
-       "(our control, on single sites)", only("main", "site"),
-       why="Episodes of site-specific mode differ in the agent's actions alone, so there is no noise but theirs; the "
-           "delay is there. EUPG weighs every action by the whole return, and thaw's is large beside what a policy "
-           "moves. With the mean of the batch's other episodes taken off, which leaves the expected gradient as it is, "
-           "agents of thaw alone gain what constant plans can, by the same physics. Over all sites a common mean is no "
-           "such help, for it is the sites that differ (`docs/learning.md`).",
-       note="The paper names delay and noise together; the noise of sites is judged below. morl-baselines' EUPG, which "
-            "the paper names, weighs an action by the rewards to come.")
+@claim(
+    "Delay by itself keeps thaw from being learnt, where sites and weathers make no noise.",
+    "Section 4.2 and 5 (our control, on single sites)",
+    only("main", "site"),
+    why="Episodes of site-specific mode differ in the agent's actions alone, so there is no noise but theirs; the "
+    "delay is there. EUPG weighs every action by the whole return, and thaw's is large beside what a policy "
+    "moves. With the mean of the batch's other episodes taken off, which leaves the expected gradient as it is, "
+    "agents of thaw alone gain what constant plans can, by the same physics. Over all sites a common mean is no "
+    "such help, for it is the sites that differ (`docs/learning.md`).",
+    note="The paper names delay and noise together; the noise of sites is judged below. morl-baselines' EUPG, which "
+    "the paper names, weighs an action by the rewards to come.",
+)
 def physics_hides_thaw(evidence):
-    gains = {(name, baseline): mean_of(own_gains(evidence, weight, **flags), "sites")
-             for name, weight in (("thaw", THAW), ("carbon", CARBON))
-             for baseline, flags in (("no baseline, as the definition", {}),
-                                     ("`--baseline others`", {"baseline": "others"}))}  # fmt: skip
-    rows = [Row(f"{name} over zero change, agents of {name} alone, {baseline}", "", number)
-            for (name, baseline), number in gains.items()]
-    rows.append(Row("thaw over zero change, agents of thaw alone, rewards to come (`--utility future`)", "",
-                    optional(lambda: mean_of(own_gains(evidence, THAW, utility="future"), "sites"))))
-    rows += [Row(f"{name} over zero change of the best of 25 constant plans", "",
-                 optional(lambda weight=weight: mean_of(constant_gains(evidence, weight), "sites")))
-             for name, weight in (("thaw", THAW), ("carbon", CARBON))]  # fmt: skip
+    gains = {
+        (name, baseline): mean_of(own_gains(evidence, weight, **flags), "sites")
+        for name, weight in (("thaw", THAW), ("carbon", CARBON))
+        for baseline, flags in (("no baseline, as the definition", {}), ("`--baseline others`", {"baseline": "others"}))
+    }
+    rows = [
+        Row(f"{name} over zero change, agents of {name} alone, {baseline}", "", number)
+        for (name, baseline), number in gains.items()
+    ]
+    rows.append(
+        Row(
+            "thaw over zero change, agents of thaw alone, rewards to come (`--utility future`)",
+            "",
+            optional(lambda: mean_of(own_gains(evidence, THAW, utility="future"), "sites")),
+        )
+    )
+    rows += [
+        Row(
+            f"{name} over zero change of the best of 25 constant plans",
+            "",
+            optional(lambda weight=weight: mean_of(constant_gains(evidence, weight), "sites")),
+        )
+        for name, weight in (("thaw", THAW), ("carbon", CARBON))
+    ]
     ours = gains["thaw", "`--baseline others`"]
     return finding(rows, below(ours, LEAST, what="the gain in thaw with a baseline"))
 
 
 def at_the_end(evidence, weight: float, column: str) -> pd.Series:
     """Mean of a column of the training episodes in the last tenth, by training seed."""
-    return pd.Series({run.arguments["seed"]: first_and_last(run, column)[1]
-                      for run in evidence.agents("fixed", weight)})  # fmt: skip
+    return pd.Series(
+        {run.arguments["seed"]: first_and_last(run, column)[1] for run in evidence.agents("fixed", weight)}
+    )
 
 
-@claim("Carbon agents raise the density to 1280 stems/ha.", "Section 4.2, figure 2c", FIXED,
-       why="Density after fifty years is a balance of planting and self-thinning, whose strength is a property of the "
-           "simulator; densities of two simulators need not agree.")
+@claim(
+    "Carbon agents raise the density to 1280 stems/ha.",
+    "Section 4.2, figure 2c",
+    FIXED,
+    why="Density after fifty years is a balance of planting and self-thinning, whose strength is a property of the "
+    "simulator; densities of two simulators need not agree.",
+)
 def carbon_density(evidence):
     density = seeds(at_the_end(evidence, CARBON, "final_density"))
     return finding([Row("stems/ha at an episode's end, last tenth of training", "1280", density)], about(density, 1280))
 
 
-@claim("Thaw agents stay at 1000 to 1020 stems/ha.", "Section 4.2, figure 2c", FIXED,
-       why="Trees shelter the ground here and thin its snow, so an agent of thaw plants as well.")
+@claim(
+    "Thaw agents stay at 1000 to 1020 stems/ha.",
+    "Section 4.2, figure 2c",
+    FIXED,
+    why="Trees shelter the ground here and thin its snow, so an agent of thaw plants as well.",
+)
 def thaw_density(evidence):
     density = seeds(at_the_end(evidence, THAW, "final_density"))
-    return finding([Row("stems/ha at an episode's end, last tenth of training", "1000 - 1020", density)],
-                   about(density, 1000, 1020))
+    return finding(
+        [Row("stems/ha at an episode's end, last tenth of training", "1000 - 1020", density)],
+        about(density, 1000, 1020),
+    )
 
 
-@claim("Carbon agents end with denser stands than thaw agents.", "Section 4.2, figure 2c", FIXED,
-       why="Both objectives gain by planting; what sets them apart is the species.")
+@claim(
+    "Carbon agents end with denser stands than thaw agents.",
+    "Section 4.2, figure 2c",
+    FIXED,
+    why="Both objectives gain by planting; what sets them apart is the species.",
+)
 def carbon_is_denser(evidence):
     apart = difference(at_the_end(evidence, CARBON, "final_density"), at_the_end(evidence, THAW, "final_density"))
     return finding([Row("stems/ha, carbon less thaw agents", "260 - 280", apart)], above(apart, least=QUARTER * 260))
 
 
-@claim("Carbon agents leave the conifer fraction as it is.", "Section 4.2, figure 2d", FIXED,
-       why="Deciduous trees use light better and close their canopy sooner, so carbon asks for them.")
+@claim(
+    "Carbon agents leave the conifer fraction as it is.",
+    "Section 4.2, figure 2d",
+    FIXED,
+    why="Deciduous trees use light better and close their canopy sooner, so carbon asks for them.",
+)
 def carbon_keeps_species(evidence):
-    changes = pd.Series({run.arguments["seed"]: np.diff(first_and_last(run, "final_conifer_fraction"))[0]
-                         for run in evidence.agents("fixed", CARBON)})  # fmt: skip
+    changes = pd.Series(
+        {
+            run.arguments["seed"]: np.diff(first_and_last(run, "final_conifer_fraction"))[0]
+            for run in evidence.agents("fixed", CARBON)
+        }
+    )
     change = seeds(changes)
-    return finding([Row("conifer fraction, last less first tenth of training", "about 0", change)],
-                   within(change, -0.05, 0.05))
+    return finding(
+        [Row("conifer fraction, last less first tenth of training", "about 0", change)], within(change, -0.05, 0.05)
+    )
 
 
-@claim("Thaw agents make stands deciduous.", "Section 4.2, figure 2d", FIXED,
-       why="Conifers build the thicker organic layer here, which insulates more when thawed than when frozen.")
+@claim(
+    "Thaw agents make stands deciduous.",
+    "Section 4.2, figure 2d",
+    FIXED,
+    why="Conifers build the thicker organic layer here, which insulates more when thawed than when frozen.",
+)
 def thaw_goes_deciduous(evidence):
     fraction = seeds(at_the_end(evidence, THAW, "final_conifer_fraction"))
-    return finding([Row("conifer fraction at an episode's end, last tenth of training", "below 0.5", fraction)],
-                   below(fraction, 0.5))
+    return finding(
+        [Row("conifer fraction at an episode's end, last tenth of training", "below 0.5", fraction)],
+        below(fraction, 0.5),
+    )
 
 
-@claim("Mixed weights lead to the highest conifer fractions.", "Figure 2d", FIXED,
-       why="The species that either objective asks for is found at the ends; between them both pull.")
+@claim(
+    "Mixed weights lead to the highest conifer fractions.",
+    "Figure 2d",
+    FIXED,
+    why="The species that either objective asks for is found at the ends; between them both pull.",
+)
 def mixed_weights_have_most_conifers(evidence):
     ends = {weight: at_the_end(evidence, weight, "final_conifer_fraction") for weight in (THAW, CARBON)}
     inner = [at_the_end(evidence, weight, "final_conifer_fraction") for weight in (0.25, 0.5, 0.75)]
@@ -224,14 +306,20 @@ def share(evidence, objective: str, component: str) -> Number:
     return Number(row.share, row.share_low, row.share_high, "resampled sites")
 
 
-@claim("The site decides about thaw, whatever the management.", "Appendix, site influence; section 4.3", VARIANCE,
-       note="It describes how sites are sampled. That boundary and climate are drawn independently of each other "
-            "explains less than half of it, and the site would decide without that (see where the objectives "
-            "conflict, in `docs/model.md`).")
+@claim(
+    "The site decides about thaw, whatever the management.",
+    "Appendix, site influence; section 4.3",
+    VARIANCE,
+    note="It describes how sites are sampled. That boundary and climate are drawn independently of each other "
+    "explains less than half of it, and the site would decide without that (see where the objectives "
+    "conflict, in `docs/model.md`).",
+)
 def site_decides_thaw(evidence):
     site = share(evidence, "thaw", "site")
-    rows = [Row("share of the site in the variance of thaw returns", "major", site),
-            Row("share of the policy", "", share(evidence, "thaw", "policy"))]
+    rows = [
+        Row("share of the site in the variance of thaw returns", "major", site),
+        Row("share of the policy", "", share(evidence, "thaw", "policy")),
+    ]
     return finding(rows, above(site, 0.5, what="the site's share"))
 
 
@@ -242,18 +330,36 @@ def on_one_site(evidence, objective: str) -> Number:
     return Number((rows["policy"] + rows["site x policy"]) / rows.drop("site").sum())
 
 
-@claim("Carbon gives clear feedback on actions, thaw a noisy one.", "Sections 4.2 and 5", VARIANCE,
-       note="Over all sites, which is what a policy gradient without a critic sees. To an agent that knows its site "
-            "thaw is the noisier one too, but not lost in noise.")
+@claim(
+    "Carbon gives clear feedback on actions, thaw a noisy one.",
+    "Sections 4.2 and 5",
+    VARIANCE,
+    note="Over all sites, which is what a policy gradient without a critic sees. To an agent that knows its site "
+    "thaw is the noisier one too, but not lost in noise.",
+)
 def carbon_feedback_is_clear(evidence):
     carbon, thaw = share(evidence, "carbon", "policy"), share(evidence, "thaw", "policy")
-    rows = [Row("share of the policy in the variance of carbon returns", "high", carbon),
-            Row("share of the policy in the variance of thaw returns", "low", thaw),
-            Row("the same on one site: carbon", "", on_one_site(evidence, "carbon")),
-            Row("thaw", "", on_one_site(evidence, "thaw"))]
+    rows = [
+        Row("share of the policy in the variance of carbon returns", "high", carbon),
+        Row("share of the policy in the variance of thaw returns", "low", thaw),
+        Row("the same on one site: carbon", "", on_one_site(evidence, "carbon")),
+        Row("thaw", "", on_one_site(evidence, "thaw")),
+    ]
     return finding(rows, all_of(above(carbon, 0.1, what="carbon's share"), below(thaw, 0.1, what="thaw's share")))
 
 
-CLAIMS = (carbon_is_learnt, thaw_is_not_learnt, asymmetry, asymmetry_on_single_sites, physics_hides_thaw,
-          carbon_density, thaw_density, carbon_is_denser, carbon_keeps_species, thaw_goes_deciduous,
-          mixed_weights_have_most_conifers, site_decides_thaw, carbon_feedback_is_clear)  # fmt: skip
+CLAIMS = (
+    carbon_is_learnt,
+    thaw_is_not_learnt,
+    asymmetry,
+    asymmetry_on_single_sites,
+    physics_hides_thaw,
+    carbon_density,
+    thaw_density,
+    carbon_is_denser,
+    carbon_keeps_species,
+    thaw_goes_deciduous,
+    mixed_weights_have_most_conifers,
+    site_decides_thaw,
+    carbon_feedback_is_clear,
+)

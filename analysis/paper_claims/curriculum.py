@@ -32,43 +32,71 @@ def control(evidence, script: str, **flags) -> pd.Series:
 def compared(name: str, first: pd.Series, other: str, second: pd.Series):
     """The finding on a difference of two rows."""
     apart = difference(first, second)
-    rows = [Row(f"scalarised, {name}", "", seeds(first)), Row(f"scalarised, {other}", "", seeds(second)),
-            Row("difference, paired by seed", f"{short(PAPERS)} for selecting", apart)]
+    rows = [
+        Row(f"scalarised, {name}", "", seeds(first)),
+        Row(f"scalarised, {other}", "", seeds(second)),
+        Row("difference, paired by seed", f"{short(PAPERS)} for selecting", apart),
+    ]
     return finding(rows, above(apart, least=LEAST, what="the difference"))
 
 
-@claim("Even a random selection of sites brings significant benefits: at the same number of years trained on.",
-       "Curriculum mechanism (our control)", CONTROLS,
-       why="Years of selected sites are worth no more than years of any sites.",
-       note="The curriculum trains on about half of its episodes: without selection the agent has half the budget. "
-            "At the same budget of simulation the two are compared above.")
+@claim(
+    "Even a random selection of sites brings significant benefits: at the same number of years trained on.",
+    "Curriculum mechanism (our control)",
+    CONTROLS,
+    why="Years of selected sites are worth no more than years of any sites.",
+    note="The curriculum trains on about half of its episodes: without selection the agent has half the budget. "
+    "At the same budget of simulation the two are compared above.",
+)
 def same_training(evidence):
-    return compared("Curriculum", scalarised(evidence, CURRICULUM), "no selection, half the budget",
-                    control(evidence, GATED, budget=0.5))
+    return compared(
+        "Curriculum",
+        scalarised(evidence, CURRICULUM),
+        "no selection, half the budget",
+        control(evidence, GATED, budget=0.5),
+    )
 
 
-@claim("It is the site that the selection has to go by: a coin would not do.", "Section 4.4 (our control)",
-       CONTROLS,
-       why="A random network of the site is a coin too, tossed once for each site, and sites do not come back.",
-       note="The control selects every episode by a coin, with the same threshold.")
+@claim(
+    "It is the site that the selection has to go by: a coin would not do.",
+    "Section 4.4 (our control)",
+    CONTROLS,
+    why="A random network of the site is a coin too, tossed once for each site, and sites do not come back.",
+    note="The control selects every episode by a coin, with the same threshold.",
+)
 def coin(evidence):
-    return compared("Curriculum", scalarised(evidence, CURRICULUM), "selection by a coin",
-                    control(evidence, CURRICULUM, selector="coin"))
+    return compared(
+        "Curriculum",
+        scalarised(evidence, CURRICULUM),
+        "selection by a coin",
+        control(evidence, CURRICULUM, selector="coin"),
+    )
 
 
-@claim("A fixed, randomly initialised network is enough to select sites.", "Curriculum mechanism", CONTROLS,
-       why="A raw random network puts nearly all sites on one side of the threshold, which side depends on its seed.",
-       note="The paper's wording taken literally; ours centres and scales the network's output over sampled sites.")
+@claim(
+    "A fixed, randomly initialised network is enough to select sites.",
+    "Curriculum mechanism",
+    CONTROLS,
+    why="A raw random network puts nearly all sites on one side of the threshold, which side depends on its seed.",
+    note="The paper's wording taken literally; ours centres and scales the network's output over sampled sites.",
+)
 def raw_network(evidence):
     raw = evidence.by_seed(share_selected, "controls", CURRICULUM, raw_selector=True)["share"]
     centred = evidence.by_seed(share_selected, "main", CURRICULUM)["share"]
     splits = mean_of(((raw > 0.1) & (raw < 0.9)).astype(float), SEEDS)
-    rows = [Row("episodes selected %, lowest of the raw networks", "", Number(100 * raw.min())),
-            Row("episodes selected %, highest of the raw networks", "", Number(100 * raw.max())),
-            Row("share of raw networks that select a tenth to nine tenths", "all", splits),
-            Row("episodes selected %, centred and scaled", "", seeds(100 * centred)),
-            Row("scalarised, raw less centred", "", optional(lambda: difference(
-                control(evidence, CURRICULUM, raw_selector=True), scalarised(evidence, CURRICULUM))))]  # fmt: skip
+    rows = [
+        Row("episodes selected %, lowest of the raw networks", "", Number(100 * raw.min())),
+        Row("episodes selected %, highest of the raw networks", "", Number(100 * raw.max())),
+        Row("share of raw networks that select a tenth to nine tenths", "all", splits),
+        Row("episodes selected %, centred and scaled", "", seeds(100 * centred)),
+        Row(
+            "scalarised, raw less centred",
+            "",
+            optional(
+                lambda: difference(control(evidence, CURRICULUM, raw_selector=True), scalarised(evidence, CURRICULUM))
+            ),
+        ),
+    ]
     return finding(rows, above(splits, 0.5, what="the share that splits the sites"))
 
 
@@ -77,60 +105,93 @@ def share_selected(one) -> dict:
     return {"share": one.runs[0].episodes.selected.mean()}
 
 
-@claim("More data would not help as selection does.", "Section 4.3 (our control)", CONTROLS,
-       why="The curriculum is compared here with the same agent, without selection and with twice the budget.")
+@claim(
+    "More data would not help as selection does.",
+    "Section 4.3 (our control)",
+    CONTROLS,
+    why="The curriculum is compared here with the same agent, without selection and with twice the budget.",
+)
 def more_data(evidence):
-    return compared("Curriculum", scalarised(evidence, CURRICULUM), "no selection, twice the budget",
-                    control(evidence, GATED, budget=2.0))
+    return compared(
+        "Curriculum",
+        scalarised(evidence, CURRICULUM),
+        "no selection, twice the budget",
+        control(evidence, GATED, budget=2.0),
+    )
 
 
 def selection(evidence, column: str) -> dict[str, Number]:
     """Means by training seed of a column of the table of selected sites: accepted, rejected and their difference."""
     sites = evidence.study("site_warming")
     name = {ours: theirs for theirs, ours in curriculum_selection.NUMBERS.items()}[column]
-    means = {category: sites[sites.selected == selected].groupby("seed")[name].mean()
-             for category, selected in curriculum_selection.CATEGORIES.items()}
+    means = {
+        category: sites[sites.selected == selected].groupby("seed")[name].mean()
+        for category, selected in curriculum_selection.CATEGORIES.items()
+    }
     means["accepted less rejected"] = means["accepted"] - means["rejected"]
     return {category: seeds(values) for category, values in means.items()}
 
 
-@claim("Accepted sites lie north, rejected ones south of 60° N.", "Table of curriculum selection", SELECTION,
-       why="A network with random weights knows nothing of latitude; which way it leans is its seed's, and over seeds "
-           "accepted and rejected sites are alike.")
+@claim(
+    "Accepted sites lie north, rejected ones south of 60° N.",
+    "Table of curriculum selection",
+    SELECTION,
+    why="A network with random weights knows nothing of latitude; which way it leans is its seed's, and over seeds "
+    "accepted and rejected sites are alike.",
+)
 def accepted_lie_north(evidence):
     latitude = selection(evidence, "latitude")
-    rows = [Row("latitude of accepted sites", "above 60", latitude["accepted"]),
-            Row("latitude of rejected sites", "below 60", latitude["rejected"]),
-            Row("accepted less rejected", "above 0", latitude["accepted less rejected"])]
+    rows = [
+        Row("latitude of accepted sites", "above 60", latitude["accepted"]),
+        Row("latitude of rejected sites", "below 60", latitude["rejected"]),
+        Row("accepted less rejected", "above 0", latitude["accepted less rejected"]),
+    ]
     accepted = above(latitude["accepted"], 60, what="accepted")
     return finding(rows, all_of(accepted, below(latitude["rejected"], 60, what="rejected")))
 
 
-@claim("Accepted sites would hardly warm, rejected ones strongly.", "Table of curriculum selection", SELECTION,
-       why="The selector sees parameters, not heat; its weights are random and never trained.")
+@claim(
+    "Accepted sites would hardly warm, rejected ones strongly.",
+    "Table of curriculum selection",
+    SELECTION,
+    why="The selector sees parameters, not heat; its weights are random and never trained.",
+)
 def accepted_are_safe(evidence):
     warming, thaw = selection(evidence, "warming"), selection(evidence, "thaw")
     apart = warming["accepted less rejected"]
-    rows = [Row("warming of accepted sites, left alone [MJ/m2/yr]", "about 0.5", warming["accepted"]),
-            Row("warming of rejected sites", "about 8.0", warming["rejected"]),
-            Row("accepted less rejected", "−7.5", apart),
-            Row("thaw return of zero change, accepted less rejected", "", thaw["accepted less rejected"])]
+    rows = [
+        Row("warming of accepted sites, left alone [MJ/m2/yr]", "about 0.5", warming["accepted"]),
+        Row("warming of rejected sites", "about 8.0", warming["rejected"]),
+        Row("accepted less rejected", "−7.5", apart),
+        Row("thaw return of zero change, accepted less rejected", "", thaw["accepted less rejected"]),
+    ]
     return finding(rows, below(apart, least=QUARTER * 7.5, what="the difference"))
 
 
-@claim("The threshold breathes: training expands and contracts with the agent's competence.", "Curriculum mechanism",
-       MAIN,
-       why="The threshold moves one way in nearly all rollouts.",
-       note="Only directions are judged: by a thousandth a rollout, which is the paper's, the threshold cannot move "
-            "far within the budget, whichever way.")
+@claim(
+    "The threshold breathes: training expands and contracts with the agent's competence.",
+    "Curriculum mechanism",
+    MAIN,
+    why="The threshold moves one way in nearly all rollouts.",
+    note="Only directions are judged: by a thousandth a rollout, which is the paper's, the threshold cannot move "
+    "far within the budget, whichever way.",
+)
 def threshold_breathes(evidence):
     table = evidence.by_seed(breathing, "main", CURRICULUM)
     change = seeds(table["range"])
-    rows = [Row("episodes that score between the lowest and the highest threshold, in points", "", change),
-            Row("lowest threshold", "", seeds(table.lowest)), Row("highest threshold", "", seeds(table.highest)),
-            Row("moves up, of all moves %", "both ways", seeds(table.up))]
-    return finding(rows, all_of(above(seeds(table.up), 5.0, what="the share of moves up"),
-                                below(seeds(table.up), 95.0, what="the share of moves up")))  # fmt: skip
+    rows = [
+        Row("episodes that score between the lowest and the highest threshold, in points", "", change),
+        Row("lowest threshold", "", seeds(table.lowest)),
+        Row("highest threshold", "", seeds(table.highest)),
+        Row("moves up, of all moves %", "both ways", seeds(table.up)),
+    ]
+    return finding(
+        rows,
+        all_of(
+            above(seeds(table.up), 5.0, what="the share of moves up"),
+            below(seeds(table.up), 95.0, what="the share of moves up"),
+        ),
+    )
 
 
 def breathing(one) -> dict:
@@ -140,9 +201,12 @@ def breathing(one) -> dict:
     moves = moves[moves != 0]
     lowest, highest = episodes.threshold.min(), episodes.threshold.max()
     between = (episodes.score > lowest) & (episodes.score <= highest)
-    return {"lowest": lowest, "highest": highest, "range": 100 * between.mean(),
-            "up": 100 * (moves > 0).mean() if len(moves) else 0.0}  # fmt: skip
+    return {
+        "lowest": lowest,
+        "highest": highest,
+        "range": 100 * between.mean(),
+        "up": 100 * (moves > 0).mean() if len(moves) else 0.0,
+    }
 
 
-CLAIMS = (same_training, coin, raw_network, more_data, accepted_lie_north,
-          accepted_are_safe, threshold_breathes)  # fmt: skip
+CLAIMS = (same_training, coin, raw_network, more_data, accepted_lie_north, accepted_are_safe, threshold_breathes)

@@ -16,11 +16,13 @@ STEP_MINUTES = 30
 OPTIMUM = 50.0
 
 
-@claim("The 25 actions are unique: five density changes times five conifer fractions.",
-       "Section 3.2; table of actions",
-       PAPER_ALONE,
-       why="Planting and thinning are the only ways in which an action reaches the stand, in the paper's timeline of a "
-           "year too. Without either the conifer fraction has nothing to act on, so those actions are one.")
+@claim(
+    "The 25 actions are unique: five density changes times five conifer fractions.",
+    "Section 3.2; table of actions",
+    PAPER_ALONE,
+    why="Planting and thinning are the only ways in which an action reaches the stand, in the paper's timeline of a "
+    "year too. Without either the conifer fraction has nothing to act on, so those actions are one.",
+)
 def unique_actions(evidence):
     density, mix = sim.management.decode(np.arange(sim.management.NUM_ACTIONS))
     different = len({(d, m if d else None) for d, m in zip(density, mix, strict=True)})
@@ -33,18 +35,26 @@ def unique_actions(evidence):
 def observation_entries(evidence):
     entries = len(boreal_env.OBSERVATION_NAMES)
     own = entries - len(sim.SITE_PARAMETERS)
-    rows = [Row("entries", f"{sum(COMPONENTS)} by its components", Number(entries)),
-            Row("entries without the site", f"{sum(COMPONENTS[:-1])} by its components", Number(own))]
+    rows = [
+        Row("entries", f"{sum(COMPONENTS)} by its components", Number(entries)),
+        Row("entries without the site", f"{sum(COMPONENTS[:-1])} by its components", Number(own)),
+    ]
     whole = equals(sum(COMPONENTS), entries, "the sum of the components")
     return finding(rows, all_of(whole, equals(sum(COMPONENTS[:-1]), own, "that without the site's")))
 
 
-@claim("The sampling ranges of the site's parameters are listed comprehensively.", "Table of sampling ranges",
-       PAPER_ALONE, note="The ranges that it does not list are ours, with their sources in `sim/site_parameters.csv`.")
+@claim(
+    "The sampling ranges of the site's parameters are listed comprehensively.",
+    "Table of sampling ranges",
+    PAPER_ALONE,
+    note="The ranges that it does not list are ours, with their sources in `sim/site_parameters.csv`.",
+)
 def listed_parameters(evidence):
     listed = Number(sum("table of sampling ranges" in one.source for one in sim.SITE_PARAMETERS.values()))
-    rows = [Row("site parameters in the observation", str(COMPONENTS[-1]), Number(len(sim.SITE_PARAMETERS))),
-            Row("of them with a range in the paper", "all", listed)]
+    rows = [
+        Row("site parameters in the observation", str(COMPONENTS[-1]), Number(len(sim.SITE_PARAMETERS))),
+        Row("of them with a range in the paper", "all", listed),
+    ]
     return finding(rows, equals(listed.value, COMPONENTS[-1], "the number listed"), CONTRADICTS)
 
 
@@ -55,10 +65,14 @@ def steps_of_a_year(evidence):
     return finding([Row("steps a year", f"{papers:,.0f}", ours)], equals(ours.value, papers, "the number"))
 
 
-@claim("Both rewards have comparable scales for optimisation.", "Appendix, reward function", VARIANCE,
-       why="The range of a year's reward is the same by construction; how much of it is used is not. A real stand's "
-           "carbon changes by a small part of the scale, while heat through the boundary differs from site to site by "
-           "as much as the scale. `boreal-balanced-v0` has the carbon scale at which policies move both alike.")
+@claim(
+    "Both rewards have comparable scales for optimisation.",
+    "Appendix, reward function",
+    VARIANCE,
+    why="The range of a year's reward is the same by construction; how much of it is used is not. A real stand's "
+    "carbon changes by a small part of the scale, while heat through the boundary differs from site to site by "
+    "as much as the scale. `boreal-balanced-v0` has the carbon scale at which policies move both alike.",
+)
 def comparable_scales(evidence):
     table = evidence.beside("variance/components.csv")
     table = table[table.value == "return"].set_index(["objective", "component"]).variance
@@ -66,24 +80,33 @@ def comparable_scales(evidence):
     sd = {name: np.sqrt(table[name].sum()) for name in ("carbon", "thaw")}
     own = {name: np.sqrt(table[name][policies].sum()) for name in sd}
     ratio = Number(sd["thaw"] / sd["carbon"])
-    rows = [Row("standard deviation of the carbon return, over sites, weathers and policies", "", Number(sd["carbon"])),
-            Row("the same of the thaw return", "", Number(sd["thaw"])),
-            Row("thaw over carbon", "comparable", ratio),
-            Row("thaw over carbon, of what the policy decides", "", Number(own["thaw"] / own["carbon"]))]
+    rows = [
+        Row("standard deviation of the carbon return, over sites, weathers and policies", "", Number(sd["carbon"])),
+        Row("the same of the thaw return", "", Number(sd["thaw"])),
+        Row("thaw over carbon", "comparable", ratio),
+        Row("thaw over carbon, of what the policy decides", "", Number(own["thaw"] / own["carbon"])),
+    ]
     return finding(rows, within(ratio, 0.5, 2.0, "thaw over carbon"))
 
 
-@claim("An optimal policy returns about 50 in either objective over 50 years.", "Appendix, reward function", FRONTS,
-       why="A carbon return of the number of years needs the scale's uptake every year, far more than boreal stands "
-           "take up, and would fill both pools to the limits that the reward itself penalises well before the end. "
-           "The thaw return is bounded by the heat that the climate drives through the boundary.")
+@claim(
+    "An optimal policy returns about 50 in either objective over 50 years.",
+    "Appendix, reward function",
+    FRONTS,
+    why="A carbon return of the number of years needs the scale's uptake every year, far more than boreal stands "
+    "take up, and would fill both pools to the limits that the reward itself penalises well before the end. "
+    "The thaw return is bounded by the heat that the climate drives through the boundary.",
+)
 def optimum(evidence):
     fronts, reward = evidence.beside("fronts/summary.csv"), boreal_env.Reward()
-    best = {name: Number((fronts[f"zero_{name}"] + fronts[f"{name}_end_{name}_gain"]).max())
-            for name in ("carbon", "thaw")}
+    best = {
+        name: Number((fronts[f"zero_{name}"] + fronts[f"{name}_end_{name}_gain"]).max()) for name in ("carbon", "thaw")
+    }
     full = (reward.biomass_limit + reward.soil_limit) / reward.carbon_scale
-    rows = [Row(f"best {name} return of any plan found, on the best of {len(fronts)} sites", "about 50", best[name])
-            for name in best]
+    rows = [
+        Row(f"best {name} return of any plan found, on the best of {len(fronts)} sites", "about 50", best[name])
+        for name in best
+    ]
     rows.append(Row("carbon return of filling empty pools to the paper's limits", "", Number(full)))
     return finding(rows, all_of(*(about(number, OPTIMUM, what=name) for name, number in best.items())))
 

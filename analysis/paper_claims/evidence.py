@@ -63,8 +63,13 @@ class Evidence:
 
     def job(self, experiment: str, script: str, budget: float = 1.0, **flags) -> Job:
         """The first job of an experiment with these flags and this multiple of the main table's steps."""
-        jobs = [job for job in self.results.jobs if job.experiment == experiment and job.script == script
-                and all(job.flags.get(name) == value for name, value in flags.items())]  # fmt: skip
+        jobs = [
+            job
+            for job in self.results.jobs
+            if job.experiment == experiment
+            and job.script == script
+            and all(job.flags.get(name) == value for name, value in flags.items())
+        ]
         if experiment == "controls":
             steps = budget * self.results.first_job("main", script).steps
             jobs = [job for job in jobs if job.steps == steps]
@@ -98,8 +103,12 @@ class Evidence:
 
     def agents(self, experiment: str, weight: float) -> list:
         """Runs of fixed-weight EUPG trained for one weight."""
-        found = [run for one in self.replicates(experiment, "eupg_fixed_lambda") for run in one.runs
-                 if run.arguments["preference"] == weight]  # fmt: skip
+        found = [
+            run
+            for one in self.replicates(experiment, "eupg_fixed_lambda")
+            for run in one.runs
+            if run.arguments["preference"] == weight
+        ]
         if not found:
             raise Missing(f"agents of the weight {weight:g}")
         return found

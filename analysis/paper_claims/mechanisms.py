@@ -40,65 +40,105 @@ def warming(one) -> dict:
     return mean_of_years(one, ["boundary_warming_mj_m2"])
 
 
-@claim("The asymmetric thaw reward is the hardest: contrast and raw degree-days score higher.", "Table 3", THAW,
-       note="Another formula is another scale: where warming weighs less, the same ground scores higher, whatever was "
-            "learnt. Gains over doing nothing, each in the units of its own reward, say more.")
+@claim(
+    "The asymmetric thaw reward is the hardest: contrast and raw degree-days score higher.",
+    "Table 3",
+    THAW,
+    note="Another formula is another scale: where warming weighs less, the same ground scores higher, whatever was "
+    "learnt. Gains over doing nothing, each in the units of its own reward, say more.",
+)
 def asymmetric_is_hardest(evidence):
     table = paper("thaw_formulations", index_col="formulation").scalarized_mean
     own = {name: formulation(evidence, name, run_numbers) for name in table.index}
-    apart = {name: difference(own[name].scalarized, own["asymmetric"].scalarized)
-             for name in ("contrast", "raw_degree_days")}  # fmt: skip
-    rows = [Row(f"scalarised, {name.replace('_', ' ')} less asymmetric",
-                short(table[name] - table["asymmetric"]), apart[name]) for name in apart]
-    rows += [Row(f"gain over zero change, {name.replace('_', ' ')}", "",
-                 optional(lambda name=name: seeds(own[name].get("gain_scalarized", pd.Series(dtype=float)))))
-             for name in own]  # fmt: skip
+    apart = {
+        name: difference(own[name].scalarized, own["asymmetric"].scalarized) for name in ("contrast", "raw_degree_days")
+    }
+    rows = [
+        Row(
+            f"scalarised, {name.replace('_', ' ')} less asymmetric",
+            short(table[name] - table["asymmetric"]),
+            apart[name],
+        )
+        for name in apart
+    ]
+    rows += [
+        Row(
+            f"gain over zero change, {name.replace('_', ' ')}",
+            "",
+            optional(lambda name=name: seeds(own[name].get("gain_scalarized", pd.Series(dtype=float)))),
+        )
+        for name in own
+    ]
     return finding(rows, all_of(*(above(number, what="each difference") for number in apart.values())))
 
 
-@claim("Under the asymmetric reward agents avoid warming; under raw degree-days they accept it (0.1 against 5.0 MJ).",
-       "Table of thaw penalties", THAW,
-       why="The site sets the warming flux far more than any policy does, so a penalty on it changes little.")
+@claim(
+    "Under the asymmetric reward agents avoid warming; under raw degree-days they accept it (0.1 against 5.0 MJ).",
+    "Table of thaw penalties",
+    THAW,
+    why="The site sets the warming flux far more than any policy does, so a penalty on it changes little.",
+)
 def asymmetric_avoids_warming(evidence):
     table = paper("thaw_formulations", index_col="formulation").warming_flux_mj
     column = "boundary_warming_mj_m2"
     flux = {name: formulation(evidence, name, warming)[column] for name in ("asymmetric", "raw_degree_days")}
     apart = difference(flux["raw_degree_days"], flux["asymmetric"])
-    rows = [Row(f"warming, {name.replace('_', ' ')} [MJ/m2/yr]", short(table[name]), seeds(flux[name]))
-            for name in flux]
+    rows = [
+        Row(f"warming, {name.replace('_', ' ')} [MJ/m2/yr]", short(table[name]), seeds(flux[name])) for name in flux
+    ]
     papers = table["raw_degree_days"] - table["asymmetric"]
     rows.append(Row("raw degree-days less asymmetric", short(papers), apart))
     return finding(rows, above(apart, least=QUARTER * papers, what="the difference"))
 
 
-@claim("Agents of the asymmetric reward keep the warming flux near 0.1 MJ.", "Table of thaw penalties", MAIN,
-       why="Most of the flux is the site's; zero change has nearly the same.",
-       note="The evaluation's sites happen to warm less than sites that are sampled at large (compare the claim on "
-            "accepted and rejected sites).")
+@claim(
+    "Agents of the asymmetric reward keep the warming flux near 0.1 MJ.",
+    "Table of thaw penalties",
+    MAIN,
+    why="Most of the flux is the site's; zero change has nearly the same.",
+    note="The evaluation's sites happen to warm less than sites that are sampled at large (compare the claim on "
+    "accepted and rejected sites).",
+)
 def warming_is_small(evidence):
     flux = seeds(formulation(evidence, "asymmetric", warming)["boundary_warming_mj_m2"])
     zero = mean_of_years(evidence.replicates("main", "zero_change")[0], ["boundary_warming_mj_m2"])
-    rows = [Row("warming [MJ/m2/yr]", "about 0.1", flux),
-            Row("warming of zero change", "", Number(zero["boundary_warming_mj_m2"]))]
+    rows = [
+        Row("warming [MJ/m2/yr]", "about 0.1", flux),
+        Row("warming of zero change", "", Number(zero["boundary_warming_mj_m2"])),
+    ]
     return finding(rows, below(flux, 0.5))
 
 
 def correlation_claim(variable: str, statement: str, why: str):
     """The claim on a correlation with the growing season, by the paper's definition: days between leaf dates."""
     papers = paper("growing_season_correlations", index_col="variable").r
-    name = {"thaw_return": "thaw_reward", "latent_heat_mj_m2": "latent_heat",
-            "ground_shortwave_mj_m2": "ground_radiation"}[variable]  # fmt: skip
+    name = {
+        "thaw_return": "thaw_reward",
+        "latent_heat_mj_m2": "latent_heat",
+        "ground_shortwave_mj_m2": "ground_radiation",
+    }[variable]
 
-    @claim(statement, "Section 4.4, table of correlations", MAIN, why=why,
-           note="The season is the paper's, of leaves: a parameter of the site. Warm days are its climate.")
+    @claim(
+        statement,
+        "Section 4.4, table of correlations",
+        MAIN,
+        why=why,
+        note="The season is the paper's, of leaves: a parameter of the site. Warm days are its climate.",
+    )
     def correlated(evidence):
-        tables = {script: evidence.by_seed(correlations, "main", script)
-                  for script in ("ppo_curriculum", "zero_change")}  # fmt: skip
+        tables = {
+            script: evidence.by_seed(correlations, "main", script) for script in ("ppo_curriculum", "zero_change")
+        }
         ours = seeds(tables["ppo_curriculum"][variable].astype(float))
-        rows = [Row("r, Curriculum PPO", f"{papers[name]:+.2f}".replace("-", "−"), ours),
-                Row("r, zero change", "", Number(tables["zero_change"][variable].iloc[0])),
-                Row("r with the days above 5 °C, Curriculum PPO", "",
-                    seeds(tables["ppo_curriculum"][f"warm_{variable}"].astype(float)))]
+        rows = [
+            Row("r, Curriculum PPO", f"{papers[name]:+.2f}".replace("-", "−"), ours),
+            Row("r, zero change", "", Number(tables["zero_change"][variable].iloc[0])),
+            Row(
+                "r with the days above 5 °C, Curriculum PPO",
+                "",
+                seeds(tables["ppo_curriculum"][f"warm_{variable}"].astype(float)),
+            ),
+        ]
         if variable == "thaw_return":
             gain = tables["ppo_curriculum"].r_gain.astype(float)
             rows.append(Row("r of the gain over zero change", "", optional(lambda: seeds(gain))))
@@ -110,14 +150,22 @@ def correlation_claim(variable: str, statement: str, why: str):
 DRAWN = "The dates of leaves are drawn around what the latitude has, and say little of the climate. "
 WARM = "By warm days, which are the climate's, a long season is a mild one: "
 SEASON_CORRELATIONS = (
-    correlation_claim("thaw_return", "Longer growing seasons go with better thaw protection (r = +0.65).",
-                      DRAWN + WARM + "mild air above a boundary of fixed temperature drives heat down."),
-    correlation_claim("latent_heat_mj_m2", "Longer growing seasons go with more latent heat (r = +0.82).",
-                      DRAWN + WARM + "warm air evaporates more."),
-    correlation_claim("ground_shortwave_mj_m2",
-                      "Longer growing seasons go with less radiation on the ground (r = −0.75).",
-                      DRAWN + WARM + "days without snow let more sunlight reach the ground."),
-)  # fmt: skip
+    correlation_claim(
+        "thaw_return",
+        "Longer growing seasons go with better thaw protection (r = +0.65).",
+        DRAWN + WARM + "mild air above a boundary of fixed temperature drives heat down.",
+    ),
+    correlation_claim(
+        "latent_heat_mj_m2",
+        "Longer growing seasons go with more latent heat (r = +0.82).",
+        DRAWN + WARM + "warm air evaporates more.",
+    ),
+    correlation_claim(
+        "ground_shortwave_mj_m2",
+        "Longer growing seasons go with less radiation on the ground (r = −0.75).",
+        DRAWN + WARM + "days without snow let more sunlight reach the ground.",
+    ),
+)
 
 
 WITHOUT = {"fire": "fire", "interception": "interception", "moss": "moss and organic layer"}
@@ -128,28 +176,42 @@ def effect(evidence, pair: str, variable: str, off: str = ALL_ON) -> Number:
     return mean_of(effects(evidence.study("mechanism_pairs"), pair, variable, off), "sites")
 
 
-@claim("A longer growing season protects permafrost: leaves for more days.", "Section 4.4, figure 4d", STUDY,
-       note="Where the paper correlates across sites, this changes one thing: the dates of leaves, on the same sites "
-            "and weathers. Stands are left alone. The sign is the paper's, the mechanism is not: leaves that are still "
-            "on the trees in autumn catch snow, and without interception the same leaves, which shade and transpire "
-            "as before, cost thaw return.")
+@claim(
+    "A longer growing season protects permafrost: leaves for more days.",
+    "Section 4.4, figure 4d",
+    STUDY,
+    note="Where the paper correlates across sites, this changes one thing: the dates of leaves, on the same sites "
+    "and weathers. Stands are left alone. The sign is the paper's, the mechanism is not: leaves that are still "
+    "on the trees in autumn catch snow, and without interception the same leaves, which shade and transpire "
+    "as before, cost thaw return.",
+)
 def season_of_leaves(evidence):
     pair = SEASON_PAIRS["leaves"]
     ours = effect(evidence, pair, "thaw_return")
-    rows = [Row(f"thaw return, {pair}", "above 0", ours),
-            Row("without interception", "", effect(evidence, pair, "thaw_return", "interception"))]
-    rows += [Row(f"thaw return, {part}", "", effect(evidence, part, "thaw_return"))
-             for part in ("leaves 20 days earlier in spring", "leaves 20 days longer in autumn")]
+    rows = [
+        Row(f"thaw return, {pair}", "above 0", ours),
+        Row("without interception", "", effect(evidence, pair, "thaw_return", "interception")),
+    ]
+    rows += [
+        Row(f"thaw return, {part}", "", effect(evidence, part, "thaw_return"))
+        for part in ("leaves 20 days earlier in spring", "leaves 20 days longer in autumn")
+    ]
     return finding(rows, above(ours, what="the effect"))
 
 
-@claim("A longer growing season protects permafrost: a milder climate.", "Section 4.4, figure 4d", STUDY,
-       why="Leaves come and go on the same dates; air that is milder above a boundary that does not follow drives "
-           "heat down.")
+@claim(
+    "A longer growing season protects permafrost: a milder climate.",
+    "Section 4.4, figure 4d",
+    STUDY,
+    why="Leaves come and go on the same dates; air that is milder above a boundary that does not follow drives "
+    "heat down.",
+)
 def season_of_climate(evidence):
     pair = SEASON_PAIRS["climate"]
-    rows = [Row(f"thaw return, {pair}", "above 0", effect(evidence, pair, "thaw_return")),
-            Row("growing season [days]", "longer", effect(evidence, pair, "growing_season_days"))]
+    rows = [
+        Row(f"thaw return, {pair}", "above 0", effect(evidence, pair, "thaw_return")),
+        Row("growing season [days]", "longer", effect(evidence, pair, "growing_season_days")),
+    ]
     return finding(rows, above(rows[0].ours, what="the effect"))
 
 
@@ -157,15 +219,19 @@ def season_of_climate(evidence):
 def season_and_fluxes(evidence):
     pair = SEASON_PAIRS["leaves"]
     water, ground = (effect(evidence, pair, name) for name in ("transpiration_mm", "ground_shortwave_mj_m2"))
-    rows = [Row("transpiration [mm/yr]", "more", water), Row("shortwave on the ground [MJ/m2/yr]", "less", ground),
-            Row("latent heat [MJ/m2/yr]", "", effect(evidence, pair, "latent_heat_mj_m2"))]
+    rows = [
+        Row("transpiration [mm/yr]", "more", water),
+        Row("shortwave on the ground [MJ/m2/yr]", "less", ground),
+        Row("latent heat [MJ/m2/yr]", "", effect(evidence, pair, "latent_heat_mj_m2")),
+    ]
     return finding(rows, all_of(above(water, what="transpiration"), below(ground, what="shortwave")))
 
 
 def off(evidence, pair: str, objective: str, mechanism: str) -> Row:
     """The line of a pair's effect with a mechanism switched off."""
-    return Row(f"{objective} return without {WITHOUT[mechanism]}", "",
-               effect(evidence, pair, f"{objective}_return", mechanism))  # fmt: skip
+    return Row(
+        f"{objective} return without {WITHOUT[mechanism]}", "", effect(evidence, pair, f"{objective}_return", mechanism)
+    )
 
 
 def conflict_claim(variable: str, start: str, statement: str, rule, why: str, *beside: str):
@@ -178,16 +244,26 @@ def conflict_claim(variable: str, start: str, statement: str, rule, why: str, *b
     def conflict(evidence):
         carbon, thaw = (effect(evidence, pair, f"{name}_return") for name in ("carbon", "thaw"))
         rows = [Row(f"carbon return, {pair}", table.carbon, carbon), Row("thaw return", table.permafrost, thaw)]
-        rows += [Row(what, "", effect(evidence, pair, name)) for name, what in (
-            ("boundary_warming_mj_m2", "warming [MJ/m2/yr]"), ("active_layer_depth_m", "active layer [m]"),
-            ("peak_swe_mm", "peak snow [mm]"), ("ground_shortwave_mj_m2", "shortwave on the ground [MJ/m2/yr]"),
-            ("gpp_kgc_m2", "gross photosynthesis [kgC/m2/yr]"),
-            ("autotrophic_respiration_kgc_m2", "respiration of plants [kgC/m2/yr]"))]  # fmt: skip
-        rows += [off(evidence, pair, name, mechanism)
-                 for name, mechanism in (("carbon", "fire"), ("thaw", "interception"), ("thaw", "moss"))]  # fmt: skip
+        rows += [
+            Row(what, "", effect(evidence, pair, name))
+            for name, what in (
+                ("boundary_warming_mj_m2", "warming [MJ/m2/yr]"),
+                ("active_layer_depth_m", "active layer [m]"),
+                ("peak_swe_mm", "peak snow [mm]"),
+                ("ground_shortwave_mj_m2", "shortwave on the ground [MJ/m2/yr]"),
+                ("gpp_kgc_m2", "gross photosynthesis [kgC/m2/yr]"),
+                ("autotrophic_respiration_kgc_m2", "respiration of plants [kgC/m2/yr]"),
+            )
+        ]
+        rows += [
+            off(evidence, pair, name, mechanism)
+            for name, mechanism in (("carbon", "fire"), ("thaw", "interception"), ("thaw", "moss"))
+        ]
         for other in others:
-            rows += [Row(f"{name} return, {other}", "", effect(evidence, other, f"{name}_return"))
-                     for name in ("carbon", "thaw")]  # fmt: skip
+            rows += [
+                Row(f"{name} return, {other}", "", effect(evidence, other, f"{name}_return"))
+                for name in ("carbon", "thaw")
+            ]
             rows += [off(evidence, other, "thaw", mechanism) for mechanism in ("interception", "moss")]
         return finding(rows, rule(carbon, thaw))
 
@@ -205,38 +281,64 @@ def together(carbon: Number, thaw: Number):
 
 
 CONFLICTS = (
-    conflict_claim("stem density", "stem density", "More stems store carbon and cost permafrost.", opposed,
-                   "Trees protect here by catching snow, which thins what insulates the ground in winter: without "
-                   "interception denser stands cost thaw return, though they shade as much. How much is caught, and "
-                   "how much the stand shelters its ground, wind decides. Where nothing burns they store carbon.",
-                   "planting, none", "in wind"),
-    conflict_claim("conifer fraction", "conifer fraction", "More conifers store carbon and warm the ground: they "
-                   "conflict directly.", opposed,
-                   "Where nothing burns, stands of conifers left alone store more carbon; they burn more. Planted, "
-                   "deciduous trees take up more. Conifers build the thicker organic layer, which insulates more when "
-                   "thawed than when frozen; planted without it deciduous trees protect better (see where the "
-                   "objectives conflict, in `docs/model.md`).", "conifers 0.2", "planting 100"),
-    conflict_claim("LAI", "LAI", "More leaf area serves both objectives.", together,
-                   "Leaf area is a trait of the site here: more of it takes up more and respires more still, and does "
-                   "not make trees grow faster, so that the paper's growth is tested in part only."),
-)  # fmt: skip
+    conflict_claim(
+        "stem density",
+        "stem density",
+        "More stems store carbon and cost permafrost.",
+        opposed,
+        "Trees protect here by catching snow, which thins what insulates the ground in winter: without "
+        "interception denser stands cost thaw return, though they shade as much. How much is caught, and "
+        "how much the stand shelters its ground, wind decides. Where nothing burns they store carbon.",
+        "planting, none",
+        "in wind",
+    ),
+    conflict_claim(
+        "conifer fraction",
+        "conifer fraction",
+        "More conifers store carbon and warm the ground: they conflict directly.",
+        opposed,
+        "Where nothing burns, stands of conifers left alone store more carbon; they burn more. Planted, "
+        "deciduous trees take up more. Conifers build the thicker organic layer, which insulates more when "
+        "thawed than when frozen; planted without it deciduous trees protect better (see where the "
+        "objectives conflict, in `docs/model.md`).",
+        "conifers 0.2",
+        "planting 100",
+    ),
+    conflict_claim(
+        "LAI",
+        "LAI",
+        "More leaf area serves both objectives.",
+        together,
+        "Leaf area is a trait of the site here: more of it takes up more and respires more still, and does "
+        "not make trees grow faster, so that the paper's growth is tested in part only.",
+    ),
+)
 
 
-@claim("Carbon and permafrost conflict: management has to trade one for the other.", "Abstract; section 4.3", FRONTS,
-       note="Non-dominated plans of single sites, found by NSGA-II; extents are between the ends of a front, and count "
-            "if both are larger than twice their standard error.")
+@claim(
+    "Carbon and permafrost conflict: management has to trade one for the other.",
+    "Abstract; section 4.3",
+    FRONTS,
+    note="Non-dominated plans of single sites, found by NSGA-II; extents are between the ends of a front, and count "
+    "if both are larger than twice their standard error.",
+)
 def trade_off(evidence):
     fronts = evidence.beside("fronts/summary.csv")
-    wide = ((fronts.carbon_extent > 2 * fronts.carbon_extent_error)
-            & (fronts.thaw_extent > 2 * fronts.thaw_extent_error))  # fmt: skip
-    rows = [Row(f"sites with a front that is no point, of {len(fronts)}", "all", Number(wide.sum())),
-            Row("median extent in carbon return", "", Number(fronts.carbon_extent[wide].median())),
-            Row("median extent in thaw return", "", Number(fronts.thaw_extent[wide].median()))]
+    wide = (fronts.carbon_extent > 2 * fronts.carbon_extent_error) & (fronts.thaw_extent > 2 * fronts.thaw_extent_error)
+    rows = [
+        Row(f"sites with a front that is no point, of {len(fronts)}", "all", Number(wide.sum())),
+        Row("median extent in carbon return", "", Number(fronts.carbon_extent[wide].median())),
+        Row("median extent in thaw return", "", Number(fronts.thaw_extent[wide].median())),
+    ]
     return finding(rows, above(Number(wide.mean()), 0.5, what="the share of sites"))
 
 
-@claim("Management can enhance the protection of permafrost.", "Abstract; section 5", MAIN,
-       note="Judged by a strategy that was not sought for a site: the best of many plans gains nearly by construction.")
+@claim(
+    "Management can enhance the protection of permafrost.",
+    "Abstract; section 5",
+    MAIN,
+    note="Judged by a strategy that was not sought for a site: the best of many plans gains nearly by construction.",
+)
 def management_protects(evidence):
     gains = evidence.replicates("main", "conifer_restoration")[0].gains
     if gains is None:
@@ -244,40 +346,72 @@ def management_protects(evidence):
     by_site = gains.groupby("seed").thaw_return.mean()
     gain = mean_of(by_site, "evaluation episodes")
     best = optional(lambda: mean_of(evidence.beside("fronts/summary.csv").thaw_end_thaw_gain.to_numpy(), "sites"))
-    rows = [Row("thaw gain over zero change, conifer restoration", "above 0", gain),
-            Row("% of episodes in which it gains", "", Number(100 * (by_site > 0).mean())),
-            Row("the best known plan of each of 12 sites (`analysis/studies/fronts.py`)", "", best)]
+    rows = [
+        Row("thaw gain over zero change, conifer restoration", "above 0", gain),
+        Row("% of episodes in which it gains", "", Number(100 * (by_site > 0).mean())),
+        Row("the best known plan of each of 12 sites (`analysis/studies/fronts.py`)", "", best),
+    ]
     return finding(rows, above(gain, what="conifer restoration's gain"))
 
 
-@claim("Carbon is stored best by dense stands of conifers.", "Abstract; table of learned strategies", FRONTS,
-       why="Deciduous trees close their canopy sooner and use light better, by the constants of the literature.")
+@claim(
+    "Carbon is stored best by dense stands of conifers.",
+    "Abstract; table of learned strategies",
+    FRONTS,
+    why="Deciduous trees close their canopy sooner and use light better, by the constants of the literature.",
+)
 def carbon_wants_conifers(evidence):
     fronts = evidence.beside("fronts/summary.csv")
     share = mean_of(fronts.carbon_end_conifer_share.to_numpy(), "sites")
     density = mean_of(fronts.carbon_end_density_stems_ha.to_numpy(), "sites")
-    rows = [Row("conifer share of what the carbon end of the front plants", "high", share),
-            Row("its density after 50 years [stems/ha]", "high", density)]
-    return finding(rows, all_of(above(share, 0.5, what="the share of conifers"),
-                                above(density, 1000.0, what="the density")))  # fmt: skip
+    rows = [
+        Row("conifer share of what the carbon end of the front plants", "high", share),
+        Row("its density after 50 years [stems/ha]", "high", density),
+    ]
+    return finding(
+        rows, all_of(above(share, 0.5, what="the share of conifers"), above(density, 1000.0, what="the density"))
+    )
 
 
-@claim("Mixed species of moderate density protect permafrost best.", "Abstract; section 4.4", FRONTS,
-       why="Conifers build the thicker organic layer, which insulates more when thawed than when frozen. Which species "
-           "protects better is not robust: see `docs/sensitivity.md`.")
+@claim(
+    "Mixed species of moderate density protect permafrost best.",
+    "Abstract; section 4.4",
+    FRONTS,
+    why="Conifers build the thicker organic layer, which insulates more when thawed than when frozen. Which species "
+    "protects better is not robust: see `docs/sensitivity.md`.",
+)
 def mixtures_protect(evidence):
     fronts = evidence.beside("fronts/summary.csv")
-    ends = {name: fronts[f"thaw_end_{name}"].dropna().to_numpy()
-            for name in ("conifer_share", "conifer_fraction", "density_stems_ha")}  # fmt: skip
+    ends = {
+        name: fronts[f"thaw_end_{name}"].dropna().to_numpy()
+        for name in ("conifer_share", "conifer_fraction", "density_stems_ha")
+    }
     fraction = mean_of(ends["conifer_fraction"], "sites")
     density = mean_of(ends["density_stems_ha"], "sites")
-    rows = [Row("conifer fraction of the stand at the thaw end of the front, last year", "0.6 - 0.65", fraction),
-            Row("conifer share of what it plants", "", mean_of(ends["conifer_share"], "sites")),
-            Row("its density after 50 years [stems/ha]", "moderate (1000 - 1020)", density)]
-    return finding(rows, all_of(about(fraction, 0.6, 0.65, what="the conifer fraction"),
-                                about(density, 1000.0, 1020.0, what="the density")))  # fmt: skip
+    rows = [
+        Row("conifer fraction of the stand at the thaw end of the front, last year", "0.6 - 0.65", fraction),
+        Row("conifer share of what it plants", "", mean_of(ends["conifer_share"], "sites")),
+        Row("its density after 50 years [stems/ha]", "moderate (1000 - 1020)", density),
+    ]
+    return finding(
+        rows,
+        all_of(
+            about(fraction, 0.6, 0.65, what="the conifer fraction"), about(density, 1000.0, 1020.0, what="the density")
+        ),
+    )
 
 
-CLAIMS = (asymmetric_is_hardest, asymmetric_avoids_warming, warming_is_small, *SEASON_CORRELATIONS, season_of_leaves,
-          season_of_climate, season_and_fluxes, *CONFLICTS, trade_off, management_protects, carbon_wants_conifers,
-          mixtures_protect)  # fmt: skip
+CLAIMS = (
+    asymmetric_is_hardest,
+    asymmetric_avoids_warming,
+    warming_is_small,
+    *SEASON_CORRELATIONS,
+    season_of_leaves,
+    season_of_climate,
+    season_and_fluxes,
+    *CONFLICTS,
+    trade_off,
+    management_protects,
+    carbon_wants_conifers,
+    mixtures_protect,
+)

@@ -13,9 +13,15 @@ from analysis.tables.common import paper
 from analysis.tables.main_results import paper_rows
 
 TITLE = "The paper's tables against each other"
-NAMES = {"curriculum_ppo": "Curriculum PPO", "ppo_gated": "PPO Gated", "eupg_variable_lambda": "Variable λ EUPG",
-         "target_density": "target density", "conifer_restoration": "conifer restoration",
-         "zero_density_change": "zero change", "plus_100_density": "+100 a year"}  # fmt: skip
+NAMES = {
+    "curriculum_ppo": "Curriculum PPO",
+    "ppo_gated": "PPO Gated",
+    "eupg_variable_lambda": "Variable λ EUPG",
+    "target_density": "target density",
+    "conifer_restoration": "conifer restoration",
+    "zero_density_change": "zero change",
+    "plus_100_density": "+100 a year",
+}
 # pairs of weights behind the percentages of violations, by the weights that the paper shows
 PAIRS = {"curriculum_ppo": 4, "fixed_weight_eupg": 4, "eupg_variable_lambda": 9, "ppo_gated": 5}
 
@@ -33,28 +39,39 @@ def front(table: pd.DataFrame) -> np.ndarray:
 def compared(name: str, detail: str, tolerance: float, what: str):
     """The finding on a column of the main table that the table of details should give too."""
     table = paper_rows().loc[list(details())]
-    rows = [Row(f"{what}, {NAMES[method]}", f"{short(row[name])} printed", f"{short(row[detail])} from its details")
-            for method, row in table.iterrows()]  # fmt: skip
+    rows = [
+        Row(f"{what}, {NAMES[method]}", f"{short(row[name])} printed", f"{short(row[detail])} from its details")
+        for method, row in table.iterrows()
+    ]
     same = bool((abs(table[name] - table[detail]) <= tolerance * table[detail].abs()).all())
     return finding(rows, Answer(same, f"all agree within {short(100 * tolerance)} %"), CONTRADICTS)
 
 
-@claim("Hypervolumes above (−2, −2) are 84.3, 23.6 and 14.2.", "Table 2 against the table of detailed objectives",
-       note="The scalarised rewards below show that the details are of the same evaluation. EUPG's details lack some "
-            "of its weights; more points can only enlarge a hypervolume.")
+@claim(
+    "Hypervolumes above (−2, −2) are 84.3, 23.6 and 14.2.",
+    "Table 2 against the table of detailed objectives",
+    note="The scalarised rewards below show that the details are of the same evaluation. EUPG's details lack some "
+    "of its weights; more points can only enlarge a hypervolume.",
+)
 def hypervolumes(evidence):
     return compared("paper_hypervolume", "paper_detail_hypervolume", 0.05, "hypervolume")
 
 
-@claim("Sparsities are 0.12, 0.09 and 0.07.", "Table 2 against the table of detailed objectives",
-       note="Sparsity as in morl-baselines, whose EUPG the paper uses; the paper does not define it. A front of a few "
-            "points that spans several units cannot have gaps this small; one divided by some scale can.")
+@claim(
+    "Sparsities are 0.12, 0.09 and 0.07.",
+    "Table 2 against the table of detailed objectives",
+    note="Sparsity as in morl-baselines, whose EUPG the paper uses; the paper does not define it. A front of a few "
+    "points that spans several units cannot have gaps this small; one divided by some scale can.",
+)
 def sparsities(evidence):
     return replace(compared("paper_sparsity", "paper_detail_sparsity", 0.05, "sparsity"), verdict=UNTESTABLE)
 
 
-@claim("Mean scalarised rewards are 8.5, 4.7 and 1.7.", "Table 2 against the table of detailed objectives",
-       note="So the details are of the same evaluation as the main table.")
+@claim(
+    "Mean scalarised rewards are 8.5, 4.7 and 1.7.",
+    "Table 2 against the table of detailed objectives",
+    note="So the details are of the same evaluation as the main table.",
+)
 def scalarised(evidence):
     rows, same = [], []
     for method, table in details().items():
@@ -65,9 +82,12 @@ def scalarised(evidence):
     return finding(rows, Answer(all(same), "all agree within the rounding of one decimal"), CONTRADICTS)
 
 
-@claim("Scalarised rewards scatter by 3.0, 6.0 and 5.0 between episodes.", "Table 2 against the details",
-       note="The bound takes carbon and thaw to move together in every episode, which makes the scatter of their "
-            "weighted sum as large as it can be, and adds that of the means between weights (EUPG's: those shown).")
+@claim(
+    "Scalarised rewards scatter by 3.0, 6.0 and 5.0 between episodes.",
+    "Table 2 against the details",
+    note="The bound takes carbon and thaw to move together in every episode, which makes the scatter of their "
+    "weighted sum as large as it can be, and adds that of the means between weights (EUPG's: those shown).",
+)
 def spreads(evidence):
     rows, possible = [], []
     for method, table in details().items():
@@ -76,23 +96,36 @@ def spreads(evidence):
         means = metrics.scalarize(table.carbon_mean, table.thaw_mean, w)
         bound = np.sqrt((most**2).mean() + means.var(ddof=0))
         printed = paper("main_results", index_col="method").scalarized_std[method]
-        rows.append(Row(f"standard deviation, {NAMES[method]}", f"{short(printed)} printed",
-                        f"at most {short(bound)} by its details"))
+        rows.append(
+            Row(
+                f"standard deviation, {NAMES[method]}",
+                f"{short(printed)} printed",
+                f"at most {short(bound)} by its details",
+            )
+        )
         possible.append(printed <= 1.05 * bound)
     return finding(rows, Answer(all(possible), "none is larger than its bound by more than a twentieth"), CONTRADICTS)
 
 
-@claim("Heuristics, one point each, have hypervolumes of 11.3 to 21.4.", "Table 2",
-       note="Averaged over weights that are symmetric about one half, the scalarised reward of one point is the mean "
-            "of its two returns. With that mean given, the rectangle above the reference point is largest if both "
-            "returns are equal, and empty if the mean is below the reference's. The paper's are of single episodes, "
-            "whose front can be larger, and which are not published.")
+@claim(
+    "Heuristics, one point each, have hypervolumes of 11.3 to 21.4.",
+    "Table 2",
+    note="Averaged over weights that are symmetric about one half, the scalarised reward of one point is the mean "
+    "of its two returns. With that mean given, the rectangle above the reference point is largest if both "
+    "returns are equal, and empty if the mean is below the reference's. The paper's are of single episodes, "
+    "whose front can be larger, and which are not published.",
+)
 def heuristic_hypervolumes(evidence):
     table, rows, possible = paper("main_results"), [], []
     for row in table[table.kind == "heuristic"].itertuples():
         side = max(row.scalarized_mean - metrics.REFERENCE_POINT[0], 0.0)
-        rows.append(Row(f"hypervolume, {NAMES[row.method]} (scalarised {short(row.scalarized_mean)})",
-                        f"{short(row.hypervolume)} printed", f"at most {short(side**2)} as one point"))
+        rows.append(
+            Row(
+                f"hypervolume, {NAMES[row.method]} (scalarised {short(row.scalarized_mean)})",
+                f"{short(row.hypervolume)} printed",
+                f"at most {short(side**2)} as one point",
+            )
+        )
         possible.append(row.hypervolume <= side**2)
     return finding(rows, Answer(all(possible), "every one is possible"), UNTESTABLE)
 
@@ -101,51 +134,72 @@ def heuristic_hypervolumes(evidence):
 def gated_means(evidence):
     printed = paper("thaw_formulations", index_col="formulation").loc["asymmetric"]
     means = details()["ppo_gated"][["carbon_mean", "thaw_mean"]].mean()
-    rows = [Row(name, f"{short(printed[f'{name}_mean'])} printed", f"{short(means[f'{name}_mean'])} from its details")
-            for name in ("carbon", "thaw")]
+    rows = [
+        Row(name, f"{short(printed[f'{name}_mean'])} printed", f"{short(means[f'{name}_mean'])} from its details")
+        for name in ("carbon", "thaw")
+    ]
     same = all(abs(printed[name] - means[name]) <= 0.0501 for name in means.index)
     return finding(rows, Answer(same, "both agree within the rounding of one decimal"), CONTRADICTS)
 
 
-@claim("Learned strategies lead to thaw returns of about −5, 8 and 6.", "Table of learned strategies against details",
-       note="The text below the details says that Variable λ EUPG \"clusters near zero\" in both objectives.")
+@claim(
+    "Learned strategies lead to thaw returns of about −5, 8 and 6.",
+    "Table of learned strategies against details",
+    note='The text below the details says that Variable λ EUPG "clusters near zero" in both objectives.',
+)
 def strategies(evidence):
     printed, rows, possible = paper("learned_strategies", index_col="method"), [], []
     for method, table in details().items():
         for name, value in (("carbon", printed.carbon[method]), ("thaw", printed.thaw_or_warming[method])):
             low, high = table[f"{name}_mean"].min(), table[f"{name}_mean"].max()
-            rows.append(Row(f"{name}, {NAMES[method]}", f"about {short(value)}",
-                            f"{short(low)} to {short(high)} by weight in its details"))
+            rows.append(
+                Row(
+                    f"{name}, {NAMES[method]}",
+                    f"about {short(value)}",
+                    f"{short(low)} to {short(high)} by weight in its details",
+                )
+            )
             possible.append(low - 0.5 <= value <= high + 0.5)
     return finding(rows, Answer(all(possible), "each lies among its weights, give or take half a unit"), CONTRADICTS)
 
 
-@claim("PPO Gated warms the ground strongly (about −5), and PPO Gated under the same reward hardly (about 0.1 MJ).",
-       "Table of learned strategies against the table of thaw penalties",
-       note="The asymmetric formulation of the second table is the default: the same agents as in the first, by their "
-            "scalarised reward and hypervolume.")
+@claim(
+    "PPO Gated warms the ground strongly (about −5), and PPO Gated under the same reward hardly (about 0.1 MJ).",
+    "Table of learned strategies against the table of thaw penalties",
+    note="The asymmetric formulation of the second table is the default: the same agents as in the first, by their "
+    "scalarised reward and hypervolume.",
+)
 def gated_warming(evidence):
     gated = paper("learned_strategies", index_col="method").thaw_or_warming["ppo_gated"]
     formulation = paper("thaw_formulations", index_col="formulation").loc["asymmetric"]
     main = paper("main_results", index_col="method").loc["ppo_gated"]
-    rows = [Row("\"high warming\", table of strategies", short(gated), "warms"),
-            Row("warming flux, table of thaw penalties [MJ]", short(formulation.warming_flux_mj), "hardly warms"),
-            Row("mean thaw return, table of formulations", short(formulation.thaw_mean), "cools")]
+    rows = [
+        Row('"high warming", table of strategies', short(gated), "warms"),
+        Row("warming flux, table of thaw penalties [MJ]", short(formulation.warming_flux_mj), "hardly warms"),
+        Row("mean thaw return, table of formulations", short(formulation.thaw_mean), "cools"),
+    ]
     same_agents = formulation.hypervolume == main.hypervolume and formulation.scalarized_mean == main.scalarized_mean
     warms, cools = gated < 0, formulation.thaw_mean > 0
     return finding(rows, Answer(not (same_agents and warms and cools), "the same agents have one sign"), CONTRADICTS)
 
 
-@claim("λ-monotonicity is violated in 50 % (Curriculum), 66.7 % (Variable λ EUPG) and 100 % (PPO Gated) of the pairs.",
-       "Appendix, λ-monotonicity, against the details",
-       note="EUPG's table shows six of the ten weights that its percentage and its odd weights point to, so its "
-            "percentage cannot be checked.")
+@claim(
+    "λ-monotonicity is violated in 50 % (Curriculum), 66.7 % (Variable λ EUPG) and 100 % (PPO Gated) of the pairs.",
+    "Appendix, λ-monotonicity, against the details",
+    note="EUPG's table shows six of the ten weights that its percentage and its odd weights point to, so its "
+    "percentage cannot be checked.",
+)
 def violations(evidence):
     printed, rows, same = paper("monotonicity_violations", index_col="method").violations_percent, [], []
     for method, table in details().items():
         ours = metrics.violations_percent(front(table))
-        rows.append(Row(f"violations, {NAMES[method]}", f"{short(printed[method])} %",
-                        f"{short(ours)} % of the {len(table) - 1} pairs shown"))
+        rows.append(
+            Row(
+                f"violations, {NAMES[method]}",
+                f"{short(printed[method])} %",
+                f"{short(ours)} % of the {len(table) - 1} pairs shown",
+            )
+        )
         same.append(abs(ours - printed[method]) < 0.1 or len(table) - 1 < PAIRS[method])
     return finding(rows, Answer(all(same), "those that can be checked agree"), CONTRADICTS)
 
@@ -177,18 +231,25 @@ def chance_of_at_most(violations_percent: float, pairs: int) -> float:
     return float(chance_of_kept(pairs + 1)[pairs - violated :].sum())
 
 
-@claim("With 50 % violations, Curriculum PPO controls the trade-off reliably; the others do not.",
-       "Appendix, λ-monotonicity",
-       note="If both returns are independent noise, a pair is kept only if carbon happens to rise and thaw to fall: "
-            "three pairs of four are violated, whatever the number of weights. The probabilities are exact.")
+@claim(
+    "With 50 % violations, Curriculum PPO controls the trade-off reliably; the others do not.",
+    "Appendix, λ-monotonicity",
+    note="If both returns are independent noise, a pair is kept only if carbon happens to rise and thaw to fall: "
+    "three pairs of four are violated, whatever the number of weights. The probabilities are exact.",
+)
 def violations_by_chance(evidence):
     printed, rows = paper("monotonicity_violations", index_col="method").violations_percent, []
     for method, pairs in PAIRS.items():
         kept = chance_of_kept(pairs + 1)
         expected = 100 * (1 - kept @ np.arange(pairs + 1) / pairs)
         chance = chance_of_at_most(printed[method], pairs)
-        rows.append(Row(f"{NAMES.get(method, 'Fixed λ EUPG')}, {pairs} pairs", f"{short(printed[method])} %",
-                        f"noise: {short(expected)} % on average; as few or fewer in {short(100 * chance)} % of cases"))
+        rows.append(
+            Row(
+                f"{NAMES.get(method, 'Fixed λ EUPG')}, {pairs} pairs",
+                f"{short(printed[method])} %",
+                f"noise: {short(expected)} % on average; as few or fewer in {short(100 * chance)} % of cases",
+            )
+        )
     chance = chance_of_at_most(printed["curriculum_ppo"], PAIRS["curriculum_ppo"])
     rule = "noise has as few violations as the curriculum in less than 5 % of cases"
     return finding(rows, Answer(chance < 0.05, rule))
@@ -200,11 +261,27 @@ def training_time(evidence):
     episode, training = printed.loc["episode_50_years_numba"], printed.loc["training_generalist_300k_steps"]
     episodes = 300_000 // 50
     low, high = (seconds * episodes / 3600 for seconds in (episode.low, episode.high))
-    rows = [Row("hours of 300,000 steps", f"{training.low:g} - {training.high:g} printed",
-                f"{short(low)} - {short(high)} from the time of an episode")]
+    rows = [
+        Row(
+            "hours of 300,000 steps",
+            f"{training.low:g} - {training.high:g} printed",
+            f"{short(low)} - {short(high)} from the time of an episode",
+        )
+    ]
     meets = low <= training.high and high >= training.low
     return finding(rows, Answer(meets, "the two ranges overlap"), CONTRADICTS)
 
 
-CLAIMS = (hypervolumes, sparsities, scalarised, spreads, heuristic_hypervolumes, gated_means, strategies, gated_warming,
-          violations, violations_by_chance, training_time)  # fmt: skip
+CLAIMS = (
+    hypervolumes,
+    sparsities,
+    scalarised,
+    spreads,
+    heuristic_hypervolumes,
+    gated_means,
+    strategies,
+    gated_warming,
+    violations,
+    violations_by_chance,
+    training_time,
+)

@@ -14,9 +14,11 @@ TITLE = "Performance on all sites"
 MAIN = only("main")
 HEURISTICS = ("target_density", "conifer_restoration", "zero_change", "plus_100")
 CURRICULUM, GATED, EUPG = "ppo_curriculum", "ppo_gated", "eupg_var_lambda"
-LEVEL = ("Ours and the paper's returns are of two simulators. Here most of a thaw return is the site's own heat flow; "
-         "warming counts more than cooling, so that returns are negative though more heat leaves the ground than "
-         "enters it; and no policy moves them by as much as sites differ.")
+LEVEL = (
+    "Ours and the paper's returns are of two simulators. Here most of a thaw return is the site's own heat flow; "
+    "warming counts more than cooling, so that returns are negative though more heat leaves the ground than "
+    "enters it; and no policy moves them by as much as sites differ."
+)
 
 
 def published(script: str) -> pd.Series:
@@ -31,42 +33,73 @@ def scalarised(evidence, script: str) -> pd.Series:
 
 def value_claim(script: str):
     """The claim on a method's scalarised reward."""
-    @claim(f"{TITLES[script]} reaches a scalarised reward of {published(script).scalarized_mean:g}.",
-           "Table 2, figure 3b", MAIN, why=LEVEL)  # fmt: skip
+
+    @claim(
+        f"{TITLES[script]} reaches a scalarised reward of {published(script).scalarized_mean:g}.",
+        "Table 2, figure 3b",
+        MAIN,
+        why=LEVEL,
+    )
     def scalarised_value(evidence):
         ours, papers = seeds(scalarised(evidence, script)), published(script).scalarized_mean
         gain = optional(lambda: seeds(evidence.metric("gain_scalarized", "main", script)))
-        rows = [Row("scalarised return", short(papers), ours),
-                Row("the same less zero change, same episodes", "", gain),
-                Row("share of the site in the variance of thaw returns (`analysis/studies/variance.py`)", "",
-                    optional(lambda: share(evidence, "thaw", "site")))]
+        rows = [
+            Row("scalarised return", short(papers), ours),
+            Row("the same less zero change, same episodes", "", gain),
+            Row(
+                "share of the site in the variance of thaw returns (`analysis/studies/variance.py`)",
+                "",
+                optional(lambda: share(evidence, "thaw", "site")),
+            ),
+        ]
         return finding(rows, about(ours, papers))
 
     return scalarised_value
 
 
-@claim("Curriculum PPO is better than PPO Gated.", "Table 2, figure 3b", only("main", "balanced"),
-       why="The selector scores a site by a random network, so what is left out is a random half of the episodes; the "
-           "claims on the curriculum below take it apart.")
+@claim(
+    "Curriculum PPO is better than PPO Gated.",
+    "Table 2, figure 3b",
+    only("main", "balanced"),
+    why="The selector scores a site by a random network, so what is left out is a random half of the episodes; the "
+    "claims on the curriculum below take it apart.",
+)
 def curriculum_beats_gated(evidence):
     papers = published(CURRICULUM).scalarized_mean - published(GATED).scalarized_mean
     apart = difference(scalarised(evidence, CURRICULUM), scalarised(evidence, GATED))
-    rows = [Row("scalarised, Curriculum less Gated", short(papers), apart),
-            Row("the same in `boreal-balanced-v0`", "", optional(lambda: difference(
-                *(evidence.metric("scalarized", "balanced", script) for script in (CURRICULUM, GATED)))))]  # fmt: skip
+    rows = [
+        Row("scalarised, Curriculum less Gated", short(papers), apart),
+        Row(
+            "the same in `boreal-balanced-v0`",
+            "",
+            optional(
+                lambda: difference(
+                    *(evidence.metric("scalarized", "balanced", script) for script in (CURRICULUM, GATED))
+                )
+            ),
+        ),
+    ]
     return finding(rows, above(apart, least=LEAST))
 
 
-@claim("PPO Gated is better than Variable λ EUPG.", "Table 2, figure 3b", MAIN,
-       why="EUPG learns to plant in some seeds and not in others.")
+@claim(
+    "PPO Gated is better than Variable λ EUPG.",
+    "Table 2, figure 3b",
+    MAIN,
+    why="EUPG learns to plant in some seeds and not in others.",
+)
 def gated_beats_eupg(evidence):
     papers = published(GATED).scalarized_mean - published(EUPG).scalarized_mean
     apart = difference(scalarised(evidence, GATED), scalarised(evidence, EUPG))
     return finding([Row("scalarised, Gated less EUPG", short(papers), apart)], above(apart, least=LEAST))
 
 
-@claim("Curriculum PPO outperforms PPO Gated in training too.", "Section 4.3, figure 3a", MAIN,
-       why="The same seed gives both the same sites, weathers and preferences: what differs is what was trained on.")
+@claim(
+    "Curriculum PPO outperforms PPO Gated in training too.",
+    "Section 4.3, figure 3a",
+    MAIN,
+    why="The same seed gives both the same sites, weathers and preferences: what differs is what was trained on.",
+)
 def curriculum_leads_in_training(evidence):
     papers = published(CURRICULUM).scalarized_mean - published(GATED).scalarized_mean
     late = {script: evidence.by_seed(late_training, "main", script)["late"] for script in (CURRICULUM, GATED)}
@@ -82,16 +115,27 @@ def late_training(one) -> dict:
 
 def beats_heuristics(method: str):
     """The claim that a method is better than every heuristic."""
-    @claim(f"{TITLES[method]} is better than every heuristic.", "Table 2", MAIN,
-           why="Planting every year gains in both objectives, and needs no learning; among constant plans there are "
-               "better ones still.")  # fmt: skip
+
+    @claim(
+        f"{TITLES[method]} is better than every heuristic.",
+        "Table 2",
+        MAIN,
+        why="Planting every year gains in both objectives, and needs no learning; among constant plans there are "
+        "better ones still.",
+    )
     def better(evidence):
         best = max(HEURISTICS, key=lambda script: scalarised(evidence, script).iloc[0])
         papers_best = max(published(script).scalarized_mean for script in HEURISTICS)
         papers = published(method).scalarized_mean - papers_best
         apart = seeds(scalarised(evidence, method) - scalarised(evidence, best).iloc[0])
-        rows = [Row(f"scalarised, {TITLES[script]}", short(published(script).scalarized_mean),
-                    Number(scalarised(evidence, script).iloc[0])) for script in HEURISTICS]
+        rows = [
+            Row(
+                f"scalarised, {TITLES[script]}",
+                short(published(script).scalarized_mean),
+                Number(scalarised(evidence, script).iloc[0]),
+            )
+            for script in HEURISTICS
+        ]
         rows.append(Row(f"{TITLES[method]} less the best of them", short(papers), apart))
         return finding(rows, above(apart, least=LEAST, what="the difference"))
 
@@ -101,14 +145,19 @@ def beats_heuristics(method: str):
 curriculum_beats_heuristics, gated_beats_heuristics = beats_heuristics(CURRICULUM), beats_heuristics(GATED)
 
 
-@claim("The site's parameters in the observation let one policy adapt to many sites.", "Section 3.2, table 1",
-       only("main", "variants"),
-       why="What is best differs little between sites, and the stand's own state is observed in any case.")
+@claim(
+    "The site's parameters in the observation let one policy adapt to many sites.",
+    "Section 3.2, table 1",
+    only("main", "variants"),
+    why="What is best differs little between sites, and the stand's own state is observed in any case.",
+)
 def sites_are_used(evidence):
     hidden = evidence.metric("scalarized", "variants", GATED, hide_site=True)
     apart = difference(scalarised(evidence, GATED), hidden)
-    rows = [Row("scalarised, PPO Gated without the site's parameters", "", seeds(hidden)),
-            Row("with less without", "above 0", apart)]
+    rows = [
+        Row("scalarised, PPO Gated without the site's parameters", "", seeds(hidden)),
+        Row("with less without", "above 0", apart),
+    ]
     return finding(rows, above(apart, what="the difference"))
 
 
@@ -120,10 +169,14 @@ def gain(evidence, script: str):
     return mean_of(one.gains.groupby("seed").scalarized_return.mean(), "evaluation episodes")
 
 
-@claim("Planting 100 stems/ha every year is worse than doing nothing.", "Table 2", MAIN,
-       why="Stands start sparse. What is planted takes up carbon and thins the snow, and the penalty of a full stand "
-           "comes late, if at all. Both objectives gain at most sites; where wind is weak planting costs thaw return "
-           "(see the claim on more stems).")
+@claim(
+    "Planting 100 stems/ha every year is worse than doing nothing.",
+    "Table 2",
+    MAIN,
+    why="Stands start sparse. What is planted takes up carbon and thins the snow, and the penalty of a full stand "
+    "comes late, if at all. Both objectives gain at most sites; where wind is weak planting costs thaw return "
+    "(see the claim on more stems).",
+)
 def planting_is_worst(evidence):
     papers = published("plus_100").scalarized_mean - published("zero_change").scalarized_mean
     ours = gain(evidence, "plus_100")
@@ -134,29 +187,40 @@ def planting_is_worst(evidence):
 def targets_are_better(evidence):
     numbers = {script: gain(evidence, script) for script in ("target_density", "conifer_restoration")}
     zero = published("zero_change").scalarized_mean
-    rows = [Row(f"scalarised, {TITLES[script]} less zero change",
-                short(published(script).scalarized_mean - zero), number) for script, number in numbers.items()]
+    rows = [
+        Row(f"scalarised, {TITLES[script]} less zero change", short(published(script).scalarized_mean - zero), number)
+        for script, number in numbers.items()
+    ]
     return finding(rows, all_of(*(above(number) for number in numbers.values())))
 
 
-@claim("Curriculum PPO's trade-offs cover more than PPO Gated's: hypervolume 84.3 against 23.6.",
-       "Table 2, figure 3c, d", MAIN,
-       why="A policy that does the same at every weight covers one point; the hypervolume is then that of its gain.",
-       note="The paper's metric is of returns above its reference point, and zero if none of ours lies there; so gains "
-            "are compared.")
+@claim(
+    "Curriculum PPO's trade-offs cover more than PPO Gated's: hypervolume 84.3 against 23.6.",
+    "Table 2, figure 3c, d",
+    MAIN,
+    why="A policy that does the same at every weight covers one point; the hypervolume is then that of its gain.",
+    note="The paper's metric is of returns above its reference point, and zero if none of ours lies there; so gains "
+    "are compared.",
+)
 def coverage(evidence):
     returns = {script: seeds(evidence.metric("hypervolume", "main", script)) for script in (CURRICULUM, GATED)}
     gains = {script: evidence.metric("gain_hypervolume", "main", script) for script in (CURRICULUM, GATED)}
     apart = difference(gains[CURRICULUM], gains[GATED])
-    rows = [Row(f"hypervolume of returns, {TITLES[script]}", f"{published(script).hypervolume:g}", returns[script])
-            for script in returns]
+    rows = [
+        Row(f"hypervolume of returns, {TITLES[script]}", f"{published(script).hypervolume:g}", returns[script])
+        for script in returns
+    ]
     rows += [Row(f"hypervolume of gains, {TITLES[script]}", "", seeds(gains[script])) for script in gains]
     rows.append(Row("hypervolume of gains, Curriculum less Gated", "above 0", apart))
     return finding(rows, above(apart, what="the difference of gains"))
 
 
-@claim("Fixed strategies fail to capture the front that Curriculum PPO covers.", "Section 4.3", MAIN,
-       why="One constant plan that gains in both objectives covers more than a front of plans that gain less.")
+@claim(
+    "Fixed strategies fail to capture the front that Curriculum PPO covers.",
+    "Section 4.3",
+    MAIN,
+    why="One constant plan that gains in both objectives covers more than a front of plans that gain less.",
+)
 def heuristics_miss_the_front(evidence):
     gains = {script: evidence.metric("gain_hypervolume", "main", script).iloc[0] for script in HEURISTICS}
     best = max(gains, key=gains.get)
@@ -165,15 +229,22 @@ def heuristics_miss_the_front(evidence):
     return finding(rows, above(apart, what="the difference"))
 
 
-@claim("Curriculum PPO's thaw returns are positive at every weight: 7.3 to 8.1.",
-       "Table of detailed objectives", MAIN, why=LEVEL)
+@claim(
+    "Curriculum PPO's thaw returns are positive at every weight: 7.3 to 8.1.",
+    "Table of detailed objectives",
+    MAIN,
+    why=LEVEL,
+)
 def thaw_is_positive(evidence):
     lowest = seeds(evidence.by_seed(lowest_thaw, "main", CURRICULUM)["lowest"])
     zero = optional(lambda: Number(evidence.by_seed(lowest_thaw, "main", "zero_change")["lowest"].iloc[0]))
     papers = paper("detailed_objectives").query("method == 'curriculum_ppo'").thaw_mean.min()
     out = seeds(evidence.by_seed(net_cooling, "main", CURRICULUM)["cooling"])
-    rows = [Row("lowest mean thaw return of any weight", short(papers), lowest), Row("of zero change", "", zero),
-            Row("heat out of the ground less heat into it [MJ/m2/yr], lowest of weights 0, 0.5, 1", "", out)]
+    rows = [
+        Row("lowest mean thaw return of any weight", short(papers), lowest),
+        Row("of zero change", "", zero),
+        Row("heat out of the ground less heat into it [MJ/m2/yr], lowest of weights 0, 0.5, 1", "", out),
+    ]
     return finding(rows, above(lowest))
 
 
@@ -189,22 +260,47 @@ def lowest_thaw(one) -> dict:
     return {"lowest": metrics.mean_returns(one.evaluation).thaw_return.min()}
 
 
-@claim("Curriculum PPO's reward scatters half as much between episodes as PPO Gated's (3.0 against 6.0).", "Table 2",
-       MAIN,
-       why="Evaluated on the same sites, methods scatter alike: the scatter is the sites'.")
+@claim(
+    "Curriculum PPO's reward scatters half as much between episodes as PPO Gated's (3.0 against 6.0).",
+    "Table 2",
+    MAIN,
+    why="Evaluated on the same sites, methods scatter alike: the scatter is the sites'.",
+)
 def curriculum_scatters_less(evidence):
     scatter = {script: evidence.metric("sd_over_episodes", "main", script) for script in (CURRICULUM, GATED)}
     common = scatter[CURRICULUM].index.intersection(scatter[GATED].index)
     ratio = seeds((scatter[CURRICULUM] / scatter[GATED])[common])
-    rows = [Row(f"standard deviation over episodes, {TITLES[script]}", f"{published(script).scalarized_std:g}",
-                seeds(scatter[script])) for script in scatter]
+    rows = [
+        Row(
+            f"standard deviation over episodes, {TITLES[script]}",
+            f"{published(script).scalarized_std:g}",
+            seeds(scatter[script]),
+        )
+        for script in scatter
+    ]
     rows.append(Row("Curriculum over Gated", "0.5", ratio))
-    rows.append(Row("share of the site in the variance of thaw returns (`analysis/studies/variance.py`)", "",
-                    optional(lambda: share(evidence, "thaw", "site"))))
+    rows.append(
+        Row(
+            "share of the site in the variance of thaw returns (`analysis/studies/variance.py`)",
+            "",
+            optional(lambda: share(evidence, "thaw", "site")),
+        )
+    )
     return finding(rows, below(ratio, 0.75, what="the ratio"))
 
 
-CLAIMS = (*(value_claim(script) for script in (CURRICULUM, GATED, EUPG)), curriculum_beats_gated, gated_beats_eupg,
-          curriculum_leads_in_training, curriculum_beats_heuristics, gated_beats_heuristics, planting_is_worst,
-          targets_are_better, coverage, heuristics_miss_the_front, sites_are_used, thaw_is_positive,
-          curriculum_scatters_less)  # fmt: skip
+CLAIMS = (
+    *(value_claim(script) for script in (CURRICULUM, GATED, EUPG)),
+    curriculum_beats_gated,
+    gated_beats_eupg,
+    curriculum_leads_in_training,
+    curriculum_beats_heuristics,
+    gated_beats_heuristics,
+    planting_is_worst,
+    targets_are_better,
+    coverage,
+    heuristics_miss_the_front,
+    sites_are_used,
+    thaw_is_positive,
+    curriculum_scatters_less,
+)

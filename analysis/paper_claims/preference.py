@@ -38,8 +38,11 @@ def change(evidence, name: str, experiment: str, script: str, **flags) -> pd.Ser
 def follows(evidence, experiment: str, script: str, **flags):
     """Change of both returns from weight 0 to 1, and whether both have the sign that the preference asks for."""
     carbon, thaw = (seeds(change(evidence, name, experiment, script, **flags)) for name in ("carbon", "thaw"))
-    return carbon, thaw, all_of(above(carbon, least=LEAST, what="carbon's change"),
-                                below(thaw, least=LEAST, what="thaw's change"))  # fmt: skip
+    return (
+        carbon,
+        thaw,
+        all_of(above(carbon, least=LEAST, what="carbon's change"), below(thaw, least=LEAST, what="thaw's change")),
+    )
 
 
 def paper_change(script: str) -> tuple[float, float]:
@@ -48,53 +51,85 @@ def paper_change(script: str) -> tuple[float, float]:
     return tuple(table[f"{name}_mean"].iloc[-1] - table[f"{name}_mean"].iloc[0] for name in ("carbon", "thaw"))
 
 
-@claim("Curriculum PPO follows the preference.", "Figure 3d; table of detailed objectives", only("main", "variants"),
-       why="Both returns rise with the carbon weight: asked for thaw the agent plants less. With each objective's "
-           "advantages normalised apart carbon follows the preference, and thaw more than without.")
+@claim(
+    "Curriculum PPO follows the preference.",
+    "Figure 3d; table of detailed objectives",
+    only("main", "variants"),
+    why="Both returns rise with the carbon weight: asked for thaw the agent plants less. With each objective's "
+    "advantages normalised apart carbon follows the preference, and thaw more than without.",
+)
 def curriculum_follows(evidence):
     carbon, thaw, answer = follows(evidence, "main", CURRICULUM)
     papers = paper_change(CURRICULUM)
-    rows = [Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
-            Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw)]
+    rows = [
+        Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
+        Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw),
+    ]
     rows += apart_rows(evidence)
     return finding(rows, answer)
 
 
 def apart_rows(evidence) -> list[Row]:
     """Lines of gated PPO without entropy bonus, and then with advantages of each objective apart too."""
-    return [Row(f"{name}, PPO Gated with {what}", "", optional(lambda name=name, flags=flags: seeds(
-                change(evidence, name, "variants", GATED, **flags))))
-            for what, flags in (("`--ent-coef 0`", NO_ENTROPY),
-                                ("`--ent-coef 0 --per-objective-advantages`", APART))
-            for name in ("carbon", "thaw")]  # fmt: skip
+    return [
+        Row(
+            f"{name}, PPO Gated with {what}",
+            "",
+            optional(lambda name=name, flags=flags: seeds(change(evidence, name, "variants", GATED, **flags))),
+        )
+        for what, flags in (("`--ent-coef 0`", NO_ENTROPY), ("`--ent-coef 0 --per-objective-advantages`", APART))
+        for name in ("carbon", "thaw")
+    ]
 
 
-@claim("Standard preference-conditioned PPO fails to follow the preference.", "Abstract; section 4.3", MAIN,
-       why="It follows here, however little.")
+@claim(
+    "Standard preference-conditioned PPO fails to follow the preference.",
+    "Abstract; section 4.3",
+    MAIN,
+    why="It follows here, however little.",
+)
 def gated_does_not_follow(evidence):
     carbon, thaw, answer = follows(evidence, "main", GATED)
     papers = paper_change(GATED)
-    rows = [Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
-            Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw)]
+    rows = [
+        Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
+        Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw),
+    ]
     return finding(rows, opposite(answer))
 
 
-@claim("Thaw is hard for its asymmetry and physics, not for a difference in the rewards' magnitude.",
-       "Appendix, reward function", only("main", "variants", "balanced"),
-       why="With advantages normalised for each objective apart, where no magnitude matters, agents asked for thaw "
-           "protect it better.",
-       note="The scale of `boreal-balanced-v0`, at which policies move both returns alike, does not make their noise "
-            "alike.")
+@claim(
+    "Thaw is hard for its asymmetry and physics, not for a difference in the rewards' magnitude.",
+    "Appendix, reward function",
+    only("main", "variants", "balanced"),
+    why="With advantages normalised for each objective apart, where no magnitude matters, agents asked for thaw "
+    "protect it better.",
+    note="The scale of `boreal-balanced-v0`, at which policies move both returns alike, does not make their noise "
+    "alike.",
+)
 def magnitude_does_not_matter(evidence):
-    equal, given = (evidence.by_seed(thaw_alone, experiment, GATED, **flags)["thaw"]
-                    for experiment, flags in (("variants", APART), ("main", {})))
+    equal, given = (
+        evidence.by_seed(thaw_alone, experiment, GATED, **flags)["thaw"]
+        for experiment, flags in (("variants", APART), ("main", {}))
+    )
     apart = difference(equal, given)
     rows = [Row("thaw return at weight 0, equal magnitudes less the default", "no more", apart), *apart_rows(evidence)]
-    rows += [Row(f"{name}, PPO Gated in `{env}`", "", optional(lambda name=name, experiment=experiment, flags=flags:
-                 seeds(change(evidence, name, experiment, GATED, **flags))))
-             for env, experiment, flags in (("boreal-generalist-v0", "main", {}),
-                                            ("boreal-balanced-v0", "balanced", {"env_id": "boreal-balanced-v0"}))
-             for name in ("carbon", "thaw")]  # fmt: skip
+    rows += [
+        Row(
+            f"{name}, PPO Gated in `{env}`",
+            "",
+            optional(
+                lambda name=name, experiment=experiment, flags=flags: seeds(
+                    change(evidence, name, experiment, GATED, **flags)
+                )
+            ),
+        )
+        for env, experiment, flags in (
+            ("boreal-generalist-v0", "main", {}),
+            ("boreal-balanced-v0", "balanced", {"env_id": "boreal-balanced-v0"}),
+        )
+        for name in ("carbon", "thaw")
+    ]
     return finding(rows, opposite(above(apart, least=LEAST, what="the difference of thaw returns")))
 
 
@@ -113,50 +148,73 @@ def violation(evidence, script: str, name: str = "violations_percent") -> pd.Ser
     return table[name].dropna()
 
 
-@claim("Curriculum PPO violates λ-monotonicity least (50 %).", "Appendix, λ-monotonicity", only("main", "fixed"),
-       why="Both returns of the PPOs rise with the carbon weight, which thaw's must not; EUPG's do not move.",
-       note="The paper counts a return that fails to increase, ties included, and so does the verdict; without ties, "
-            "one that moves the wrong way counts. In random order: the same points, shuffled. Beyond their interval: "
-            "only changes larger than their paired interval over episodes count.")
+@claim(
+    "Curriculum PPO violates λ-monotonicity least (50 %).",
+    "Appendix, λ-monotonicity",
+    only("main", "fixed"),
+    why="Both returns of the PPOs rise with the carbon weight, which thaw's must not; EUPG's do not move.",
+    note="The paper counts a return that fails to increase, ties included, and so does the verdict; without ties, "
+    "one that moves the wrong way counts. In random order: the same points, shuffled. Beyond their interval: "
+    "only changes larger than their paired interval over episodes count.",
+)
 def curriculum_violates_least(evidence):
     rows, printed = [], paper("monotonicity_violations", index_col="method").violations_percent
     for script in (CURRICULUM, GATED, EUPG, "eupg_fixed_lambda"):
-        for name, what in (("violations_or_ties_percent", ""), ("violations_percent", ", without ties"),
-                           ("noise_violations_percent", ", without ties, in random order"),
-                           ("significant_violations_percent", ", beyond their interval")):  # fmt: skip
+        for name, what in (
+            ("violations_or_ties_percent", ""),
+            ("violations_percent", ", without ties"),
+            ("noise_violations_percent", ", without ties, in random order"),
+            ("significant_violations_percent", ", beyond their interval"),
+        ):
             papers = "" if what else f"{printed[PAPER_NAMES[script]]:g}"
             ours = optional(lambda script=script, name=name: seeds(violation(evidence, script, name)))
             rows.append(Row(f"violations %, {TITLES[script]}{what}", papers, ours))
     answers = []
     for other in (GATED, EUPG):
         papers = printed[PAPER_NAMES[CURRICULUM]] - printed[PAPER_NAMES[other]]
-        apart = difference(*(violation(evidence, script, "violations_or_ties_percent")
-                             for script in (CURRICULUM, other)))
+        apart = difference(
+            *(violation(evidence, script, "violations_or_ties_percent") for script in (CURRICULUM, other))
+        )
         rows.append(Row(f"Curriculum less {TITLES[other]}", short(papers), apart))
         answers.append(below(apart, least=QUARTER * abs(papers), what="each difference"))
     return finding(rows, all_of(*answers))
 
 
-@claim("PPO Gated violates λ-monotonicity in every pair of weights.", "Appendix, λ-monotonicity", MAIN,
-       why="A policy that ignores the preference violates three pairs of four by chance if its returns are "
-           "independent, more if they rise and fall together between weights.")
+@claim(
+    "PPO Gated violates λ-monotonicity in every pair of weights.",
+    "Appendix, λ-monotonicity",
+    MAIN,
+    why="A policy that ignores the preference violates three pairs of four by chance if its returns are "
+    "independent, more if they rise and fall together between weights.",
+)
 def gated_always_violates(evidence):
     ours = seeds(violation(evidence, GATED, "violations_or_ties_percent"))
     papers = paper("monotonicity_violations", index_col="method").violations_percent["ppo_gated"]
-    rows = [Row("violations %", short(papers), ours),
-            Row("without ties, in random order %", "", seeds(violation(evidence, GATED, "noise_violations_percent")))]
+    rows = [
+        Row("violations %", short(papers), ours),
+        Row("without ties, in random order %", "", seeds(violation(evidence, GATED, "noise_violations_percent"))),
+    ]
     return finding(rows, about(ours, papers))
 
 
-@claim("Curriculum PPO violates λ-monotonicity less than its own points in random order.",
-       "Appendix, λ-monotonicity (our control)", MAIN,
-       why="The policy hardly differs between weights.",
-       note="That the order of the weights is not a random one is not yet that the preference is followed, which is "
-            "judged above.")
+@claim(
+    "Curriculum PPO violates λ-monotonicity less than its own points in random order.",
+    "Appendix, λ-monotonicity (our control)",
+    MAIN,
+    why="The policy hardly differs between weights.",
+    note="That the order of the weights is not a random one is not yet that the preference is followed, which is "
+    "judged above.",
+)
 def curriculum_beats_chance(evidence):
     apart = difference(violation(evidence, CURRICULUM), violation(evidence, CURRICULUM, "noise_violations_percent"))
     return finding([Row("violations %, less those in random order", "", apart)], below(apart, what="the difference"))
 
 
-CLAIMS = (curriculum_follows, gated_does_not_follow, magnitude_does_not_matter, curriculum_violates_least,
-          gated_always_violates, curriculum_beats_chance)  # fmt: skip
+CLAIMS = (
+    curriculum_follows,
+    gated_does_not_follow,
+    magnitude_does_not_matter,
+    curriculum_violates_least,
+    gated_always_violates,
+    curriculum_beats_chance,
+)

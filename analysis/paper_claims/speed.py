@@ -42,9 +42,13 @@ def episode(evidence):
     return finding(rows, below(ours, most(name)))
 
 
-@claim("The same takes 12 to 15 s in pure Python.", "Appendix, runtime", BENCHMARK,
-       why="Interpreted, every operation on every lane's field is looked up anew; the uncompiled backend is there to "
-           "compare bits with, not to be fast. How much physics a step of the paper's has is not known.")
+@claim(
+    "The same takes 12 to 15 s in pure Python.",
+    "Appendix, runtime",
+    BENCHMARK,
+    why="Interpreted, every operation on every lane's field is looked up anew; the uncompiled backend is there to "
+    "compare bits with, not to be fast. How much physics a step of the paper's has is not known.",
+)
 def pure_python(evidence):
     name = "episode_50_years_pure_python"
     ours = measured(evidence, "50-year episode, python backend")
@@ -53,6 +57,7 @@ def pure_python(evidence):
 
 def training_claim(statement: str, command: str, experiment: str, script: str, name: str):
     """The claim on the time of a training."""
+
     @claim(statement, "Appendix, runtime", command, note=FASTER)
     def training(evidence):
         values = [training_hours(run) for one in evidence.replicates(experiment, script) for run in one.runs]
@@ -65,21 +70,42 @@ def training_claim(statement: str, command: str, experiment: str, script: str, n
 
 
 TRAINING = (
-    training_claim("Training on all sites takes 8 to 12 hours.", only("main"), "main", "ppo_curriculum",
-                   "training_generalist_300k_steps"),
-    training_claim("Training on one site takes 3 to 4 hours.", only("site"), "site", "eupg_fixed_lambda",
-                   "training_site_specific_100k_steps"),
-)  # fmt: skip
+    training_claim(
+        "Training on all sites takes 8 to 12 hours.",
+        only("main"),
+        "main",
+        "ppo_curriculum",
+        "training_generalist_300k_steps",
+    ),
+    training_claim(
+        "Training on one site takes 3 to 4 hours.",
+        only("site"),
+        "site",
+        "eupg_fixed_lambda",
+        "training_site_specific_100k_steps",
+    ),
+)
 
 
-@claim("With 16 workers training takes 1 to 2 hours: it scales well with cores.", "Appendix, runtime", BENCHMARK,
-       note="Needs a machine of as many cores; ours has fewer unless the benchmark has the row.")
+@claim(
+    "With 16 workers training takes 1 to 2 hours: it scales well with cores.",
+    "Appendix, runtime",
+    BENCHMARK,
+    note="Needs a machine of as many cores; ours has fewer unless the benchmark has the row.",
+)
 def workers(evidence):
     table = evidence.beside("benchmark.csv", pd.read_csv)
     threads = table[table.section == "threads"].set_index("what")
     ratios = {int(what.split()[0]): row.ratio for what, row in threads.iterrows()}
-    rows = [Row(f"speed of {number} threads, in that of one", "4 - 12 for 16 workers" if number == WORKERS else "",
-                Number(ratio)) for number, ratio in sorted(ratios.items()) if number > 1]
+    rows = [
+        Row(
+            f"speed of {number} threads, in that of one",
+            "4 - 12 for 16 workers" if number == WORKERS else "",
+            Number(ratio),
+        )
+        for number, ratio in sorted(ratios.items())
+        if number > 1
+    ]
     if WORKERS not in ratios:
         return Finding(rows or [Row("threads", "16 workers", "one core")], UNTESTABLE)
     printed = paper("runtime", index_col="quantity")
@@ -87,27 +113,43 @@ def workers(evidence):
     return finding(rows, above(Number(ratios[WORKERS]), least, what="the speed-up"))
 
 
-@claim("The canopy's solver takes 60 to 70 % of the physics.", "Appendix, runtime", PROFILE,
-       why="The canopy is solved by Newton's method in few iterations; conductances, transfers and snow cost as much.")
+@claim(
+    "The canopy's solver takes 60 to 70 % of the physics.",
+    "Appendix, runtime",
+    PROFILE,
+    why="The canopy is solved by Newton's method in few iterations; conductances, transfers and snow cost as much.",
+)
 def solver_share(evidence):
     table = evidence.beside("profile_kernel.csv", pd.read_csv).set_index("phase")
     share = {name: 100 * table.loc[name].sum() / table.loc["sum"].sum() for name in ("solve_canopy", "conductances")}
     ours = Number(share["solve_canopy"])
-    rows = [Row("share of the solver [%], mean of four moments of the year", published("canopy_solver_share"), ours),
-            Row("with the conductances it starts from [%]", "", Number(sum(share.values())))]
+    rows = [
+        Row("share of the solver [%], mean of four moments of the year", published("canopy_solver_share"), ours),
+        Row("with the conductances it starts from [%]", "", Number(sum(share.values()))),
+    ]
     return finding(rows, about(ours, 60, 70))
 
 
-@claim("An environment needs 50 to 100 MB of memory.", "Appendix, runtime", BENCHMARK, note=FASTER,
-       why="Each worker process has numpy, gymnasium and the compiled physics for itself.")
+@claim(
+    "An environment needs 50 to 100 MB of memory.",
+    "Appendix, runtime",
+    BENCHMARK,
+    note=FASTER,
+    why="Each worker process has numpy, gymnasium and the compiled physics for itself.",
+)
 def memory(evidence):
     ours = measured(evidence, "async worker")
-    return finding([Row("a worker's own memory [MB]", published("memory_per_env"), ours)],
-                   below(ours, most("memory_per_env")))
+    return finding(
+        [Row("a worker's own memory [MB]", published("memory_per_env"), ours)], below(ours, most("memory_per_env"))
+    )
 
 
-@claim("16 environments and the agent fit into 2 to 3 GB.", "Appendix, runtime", BENCHMARK, 
-       note="The agent's process was not measured: its library alone takes more memory than sixteen environments.")
+@claim(
+    "16 environments and the agent fit into 2 to 3 GB.",
+    "Appendix, runtime",
+    BENCHMARK,
+    note="The agent's process was not measured: its library alone takes more memory than sixteen environments.",
+)
 def memory_of_all(evidence):
     worker, process = measured(evidence, "async worker"), measured(evidence, "this process")
     ours = Number((WORKERS * worker.value + process.value) / 1000)
@@ -115,17 +157,28 @@ def memory_of_all(evidence):
     return Finding(rows, UNTESTABLE)
 
 
-@claim("A training costs one dollar of cloud computing (c5.4xlarge).", "Appendix, runtime", only("main"),
-       note="For the whole machine of sixteen virtual cores (on demand, Linux, Northern Virginia; the price is from "
-            "AWS's documentation of Auto Scaling), though a training of ours uses one of them; evaluation included.")
+@claim(
+    "A training costs one dollar of cloud computing (c5.4xlarge).",
+    "Appendix, runtime",
+    only("main"),
+    note="For the whole machine of sixteen virtual cores (on demand, Linux, Northern Virginia; the price is from "
+    "AWS's documentation of Auto Scaling), though a training of ours uses one of them; evaluation included.",
+)
 def dollars(evidence):
-    spent = pd.Series([DOLLARS_PER_HOUR * (hours(run)["training"] + hours(run)["evaluation"])
-                       for one in evidence.replicates("main", "ppo_curriculum") for run in one.runs])
+    spent = pd.Series(
+        [
+            DOLLARS_PER_HOUR * (hours(run)["training"] + hours(run)["evaluation"])
+            for one in evidence.replicates("main", "ppo_curriculum")
+            for run in one.runs
+        ]
+    )
     printed = paper("runtime", index_col="quantity").loc["training_generalist_16_workers"]
     low, high = (DOLLARS_PER_HOUR * value for value in (printed.low, printed.high))
     ours = seeds(spent)
-    rows = [Row("USD a training", f"1 ({low:.2f} - {high:.2f} from its hours)", ours),
-            Row("price of the machine [USD/h]", "", Number(DOLLARS_PER_HOUR))]
+    rows = [
+        Row("USD a training", f"1 ({low:.2f} - {high:.2f} from its hours)", ours),
+        Row("price of the machine [USD/h]", "", Number(DOLLARS_PER_HOUR)),
+    ]
     return finding(rows, below(ours, 1.1))
 
 

@@ -42,15 +42,21 @@ def strategy(evidence, script: str, name: str) -> pd.Series:
     return values
 
 
-@claim("PPO Gated ends with the highest conifer fraction (0.75 to 0.95), Curriculum PPO with 0.6 to 0.65, EUPG with "
-       "0.35 to 0.65.", "Section 4.4, figure 4a; appendix, demographics", MAIN,
-       why="At equal weights the species hardly matters on average: what conifers gain in thaw they lose in carbon "
-           "(`docs/learning.md`, signal to noise). Both PPOs stay near the even mix that they start from, EUPG goes "
-           "where its seed leads.")
+@claim(
+    "PPO Gated ends with the highest conifer fraction (0.75 to 0.95), Curriculum PPO with 0.6 to 0.65, EUPG with "
+    "0.35 to 0.65.",
+    "Section 4.4, figure 4a; appendix, demographics",
+    MAIN,
+    why="At equal weights the species hardly matters on average: what conifers gain in thaw they lose in carbon "
+    "(`docs/learning.md`, signal to noise). Both PPOs stay near the even mix that they start from, EUPG goes "
+    "where its seed leads.",
+)
 def conifer_fractions(evidence):
     ours = {script: seeds(strategy(evidence, script, "final_conifer_fraction")) for script in FRACTIONS}
-    rows = [Row(f"conifer fraction in the last year, {TITLES[script]}", f"{low} - {high}", ours[script])
-            for script, (low, high) in FRACTIONS.items()]
+    rows = [
+        Row(f"conifer fraction in the last year, {TITLES[script]}", f"{low} - {high}", ours[script])
+        for script, (low, high) in FRACTIONS.items()
+    ]
     answers = (about(ours[script], *FRACTIONS[script], what=TITLES[script]) for script in FRACTIONS)
     return finding(rows, all_of(*answers))
 
@@ -64,15 +70,23 @@ def ordered(evidence, name: str, first: str, second: str, what: str, papers: str
     return finding(rows, above(apart, least=least, what="the difference"))
 
 
-@claim("PPO Gated has more conifers than Curriculum PPO.", "Section 4.4, figure 4a", MAIN,
-       why="Both are the same agent; the curriculum is trained on a part of the episodes.")
+@claim(
+    "PPO Gated has more conifers than Curriculum PPO.",
+    "Section 4.4, figure 4a",
+    MAIN,
+    why="Both are the same agent; the curriculum is trained on a part of the episodes.",
+)
 def gated_has_more_conifers(evidence):
     what = "conifer fraction in the last year"
     return ordered(evidence, "final_conifer_fraction", GATED, CURRICULUM, what, "0.1 - 0.35", 0.1)
 
 
-@claim("PPO Gated keeps denser stands than Curriculum PPO.", "Section 4.4, figure 4b, c", MAIN,
-       why="Both are the same agent; the curriculum is trained on a part of the episodes.")
+@claim(
+    "PPO Gated keeps denser stands than Curriculum PPO.",
+    "Section 4.4, figure 4b, c",
+    MAIN,
+    why="Both are the same agent; the curriculum is trained on a part of the episodes.",
+)
 def gated_is_denser(evidence):
     return ordered(evidence, "density", GATED, CURRICULUM, "stems/ha, mean over the years")
 
@@ -82,28 +96,46 @@ def curriculum_is_denser(evidence):
     return ordered(evidence, "density", CURRICULUM, EUPG, "stems/ha, mean over the years")
 
 
-@claim("Variable λ EUPG falls into inaction: minimal changes.", "Section 4.4; table of learned strategies", MAIN,
-       why="Without an entropy bonus it settles on few actions, and on planting ones.",
-       note="The appendix says of the same agent that it \"exhibits sustained density growth\".")
+@claim(
+    "Variable λ EUPG falls into inaction: minimal changes.",
+    "Section 4.4; table of learned strategies",
+    MAIN,
+    why="Without an entropy bonus it settles on few actions, and on planting ones.",
+    note='The appendix says of the same agent that it "exhibits sustained density growth".',
+)
 def eupg_does_little(evidence):
-    done = {script: strategy(evidence, script, "planted") + strategy(evidence, script, "thinned")
-            for script in (EUPG, GATED, "random_valid")}  # fmt: skip
+    done = {
+        script: strategy(evidence, script, "planted") + strategy(evidence, script, "thinned")
+        for script in (EUPG, GATED, "random_valid")
+    }
     apart = seeds(done[EUPG] / done["random_valid"].iloc[0])
-    rows = [Row(f"planted and thinned [stems/ha/yr], {TITLES[script]}", "minimal" if script == EUPG else "",
-                seeds(done[script])) for script in (EUPG, GATED)]
+    rows = [
+        Row(
+            f"planted and thinned [stems/ha/yr], {TITLES[script]}",
+            "minimal" if script == EUPG else "",
+            seeds(done[script]),
+        )
+        for script in (EUPG, GATED)
+    ]
     rows.append(Row("of random valid actions", "", Number(done["random_valid"].iloc[0])))
     rows.append(Row("EUPG over random valid actions", "below 1", apart))
     return finding(rows, below(apart, 0.5, what="the ratio to random actions"))
 
 
-@claim("PPO Gated plants early and fast; stands thin naturally later.", "Section 4.4, figure 4b", MAIN,
-       why="The agent plants as long as there is room, and mortality makes room every year.")
+@claim(
+    "PPO Gated plants early and fast; stands thin naturally later.",
+    "Section 4.4, figure 4b",
+    MAIN,
+    why="The agent plants as long as there is room, and mortality makes room every year.",
+)
 def early_growth(evidence):
     curves = by_year(evidence.replicates("main", GATED), "density_stems_ha")
     decline = seeds(pd.Series(100 * (1 - curves[:, -1] / curves.max(axis=1))))
     peak = seeds(pd.Series(1.0 + curves.argmax(axis=1)))
-    rows = [Row("year of highest density", "early", peak),
-            Row("decline from there to the last year, %", "above 0", decline)]
+    rows = [
+        Row("year of highest density", "early", peak),
+        Row("decline from there to the last year, %", "above 0", decline),
+    ]
     early = below(peak, 25.0, what="the year of the peak")
     return finding(rows, all_of(early, above(decline, 1.0, what="the decline")))
 
@@ -121,23 +153,33 @@ def gain(evidence, script: str, objective: str) -> pd.Series:
     return table[objective]
 
 
-@claim("PPO Gated farms carbon and fails to protect permafrost.", "Section 4.4; table of learned strategies", MAIN,
-       why="Planting gains in both objectives on average here: most sites have wind enough to thin what snow trees "
-           "catch (see the claim on more stems).")
+@claim(
+    "PPO Gated farms carbon and fails to protect permafrost.",
+    "Section 4.4; table of learned strategies",
+    MAIN,
+    why="Planting gains in both objectives on average here: most sites have wind enough to thin what snow trees "
+    "catch (see the claim on more stems).",
+)
 def gated_fails_permafrost(evidence):
     carbon, thaw = (seeds(gain(evidence, GATED, f"{name}_return")) for name in ("carbon", "thaw"))
     rows = [Row("carbon gain over zero change", "above 0", carbon), Row("thaw gain over zero change", "below 0", thaw)]
     return finding(rows, all_of(above(carbon, what="carbon's gain"), below(thaw, what="thaw's gain")))
 
 
-@claim("Curriculum PPO protects permafrost better than PPO Gated.", "Section 4.4; table of detailed objectives", MAIN,
-       why="Trained on other episodes, the same agent finds the same kind of policy.")
+@claim(
+    "Curriculum PPO protects permafrost better than PPO Gated.",
+    "Section 4.4; table of detailed objectives",
+    MAIN,
+    why="Trained on other episodes, the same agent finds the same kind of policy.",
+)
 def curriculum_protects(evidence):
     table = paper("detailed_objectives").groupby("method").thaw_mean.mean()
     papers = table["curriculum_ppo"] - table["ppo_gated"]
     apart = difference(gain(evidence, CURRICULUM, "thaw_return"), gain(evidence, GATED, "thaw_return"))
-    rows = [Row(f"thaw gain, {TITLES[script]}", "", seeds(gain(evidence, script, "thaw_return")))
-            for script in (CURRICULUM, GATED)]
+    rows = [
+        Row(f"thaw gain, {TITLES[script]}", "", seeds(gain(evidence, script, "thaw_return")))
+        for script in (CURRICULUM, GATED)
+    ]
     rows.append(Row("Curriculum less Gated", short(papers), apart))
     return finding(rows, above(apart, least=LEAST, what="the difference"))
 
@@ -149,31 +191,48 @@ def older_deciduous(one) -> dict:
     return {"stems": last.groupby("variable")["mean"].mean().sum()}
 
 
-@claim("Variable λ EUPG keeps most mature and old deciduous trees.", "Appendix, demographics", MAIN,
-       why="Its agents settle on one mix, at every weight, and mostly on one of more conifers than both PPOs end with: "
-           "fewer deciduous trees are planted that could grow old.")
+@claim(
+    "Variable λ EUPG keeps most mature and old deciduous trees.",
+    "Appendix, demographics",
+    MAIN,
+    why="Its agents settle on one mix, at every weight, and mostly on one of more conifers than both PPOs end with: "
+    "fewer deciduous trees are planted that could grow old.",
+)
 def eupg_keeps_old_trees(evidence):
     stems = {script: evidence.by_seed(older_deciduous, "main", script)["stems"] for script in FRACTIONS}
     apart = [difference(stems[EUPG], stems[other]) for other in (GATED, CURRICULUM)]
-    rows = [Row(f"mature and old deciduous stems/ha, last year, {TITLES[script]}", "", seeds(stems[script]))
-            for script in stems]
-    rows += [Row(f"EUPG less {TITLES[other]}", "above 0", number)
-             for other, number in zip((GATED, CURRICULUM), apart, strict=True)]
+    rows = [
+        Row(f"mature and old deciduous stems/ha, last year, {TITLES[script]}", "", seeds(stems[script]))
+        for script in stems
+    ]
+    rows += [
+        Row(f"EUPG less {TITLES[other]}", "above 0", number)
+        for other, number in zip((GATED, CURRICULUM), apart, strict=True)
+    ]
     return finding(rows, all_of(*(above(number, what="each difference") for number in apart)))
 
 
-@claim("PPO Gated's density generalises from training to evaluation, Variable λ EUPG's does not.",
-       "Appendix, training dynamics", MAIN,
-       why="Training draws new sites in every episode, from the evaluation's distribution: there is nothing to overfit "
-           "to.")
+@claim(
+    "PPO Gated's density generalises from training to evaluation, Variable λ EUPG's does not.",
+    "Appendix, training dynamics",
+    MAIN,
+    why="Training draws new sites in every episode, from the evaluation's distribution: there is nothing to overfit "
+    "to.",
+)
 def density_generalises(evidence):
     shift = {}
     for script in (GATED, EUPG):
         late = evidence.by_seed(late_density, "main", script)["late"]
         shift[script] = 100 * (strategy(evidence, script, "final_density") / late - 1).abs()
     apart = difference(shift[EUPG], shift[GATED])
-    rows = [Row(f"density at evaluation against late training, difference in %, {TITLES[script]}",
-                "small" if script == GATED else "large", seeds(shift[script])) for script in shift]
+    rows = [
+        Row(
+            f"density at evaluation against late training, difference in %, {TITLES[script]}",
+            "small" if script == GATED else "large",
+            seeds(shift[script]),
+        )
+        for script in shift
+    ]
     rows.append(Row("EUPG less PPO Gated", "above 0", apart))
     small = below(seeds(shift[GATED]), 10, what="PPO Gated's own")
     return finding(rows, all_of(above(apart, what="the difference"), small))
@@ -184,33 +243,52 @@ def late_density(one) -> dict:
     return {"late": first_and_last(one.runs[0], "final_density")[1]}
 
 
-@claim("Carbon's gradient overpowers thaw's in PPO Gated.", "Section 4.4; table of learned strategies",
-       only("main", "variants", "difficulty"),
-       note="The runs log losses, not the gradient of each objective; with the norms of both in every update it could "
-            "be tested. What can be seen is what becomes of the policy if advantages are normalised for each objective "
-            "apart.")
+@claim(
+    "Carbon's gradient overpowers thaw's in PPO Gated.",
+    "Section 4.4; table of learned strategies",
+    only("main", "variants", "difficulty"),
+    note="The runs log losses, not the gradient of each objective; with the norms of both in every update it could "
+    "be tested. What can be seen is what becomes of the policy if advantages are normalised for each objective "
+    "apart.",
+)
 def gradient_dominance(evidence):
-    rows = [Row(f"{name}, weight 1 less weight 0, {what}", "",
-                optional(lambda n=name, e=experiment, f=flags: seeds(change(evidence, n, e, GATED, **f))))
-            for name in ("carbon", "thaw")
-            for what, experiment, flags in (("PPO Gated", "main", {}),
-                                            ("per-objective advantages, no entropy bonus", "variants", APART))]
+    rows = [
+        Row(
+            f"{name}, weight 1 less weight 0, {what}",
+            "",
+            optional(lambda n=name, e=experiment, f=flags: seeds(change(evidence, n, e, GATED, **f))),
+        )
+        for name in ("carbon", "thaw")
+        for what, experiment, flags in (
+            ("PPO Gated", "main", {}),
+            ("per-objective advantages, no entropy bonus", "variants", APART),
+        )
+    ]
     gradient = evidence.results.study("gradient_noise")
     if gradient is not None:
         script = gradient[(gradient.utility == "total") & (gradient.baseline == "none")].set_index("objective")
-        rows += [Row(f"square of the noise in EUPG's gradient of {name}, before training", "",
-                     Number(script.noise[name])) for name in ("carbon", "thaw")]  # fmt: skip
+        rows += [
+            Row(f"square of the noise in EUPG's gradient of {name}, before training", "", Number(script.noise[name]))
+            for name in ("carbon", "thaw")
+        ]
     return Finding(rows, UNTESTABLE)
 
 
-@claim("Curriculum PPO makes for longer growing seasons.", "Section 4.4", MAIN,
-       why="The growing season is a parameter of the site in the paper's own observation, between the days of first "
-           "growth and of fall; days on which the air is warm enough, as logged here, no stand changes either.")
+@claim(
+    "Curriculum PPO makes for longer growing seasons.",
+    "Section 4.4",
+    MAIN,
+    why="The growing season is a parameter of the site in the paper's own observation, between the days of first "
+    "growth and of fall; days on which the air is warm enough, as logged here, no stand changes either.",
+)
 def longer_season(evidence):
     days = {script: evidence.by_seed(mean_season, "main", script).days for script in (CURRICULUM, "zero_change")}
     apart = seeds(days[CURRICULUM] - days["zero_change"].iloc[0])
-    return finding([Row("growing season less that of zero change, same episodes [days]", "above 0", apart)],
-                   above(apart, least=1.0, what="the difference"), CONTRADICTS)
+    return finding(
+        [Row("growing season less that of zero change, same episodes [days]", "above 0", apart)],
+        above(apart, least=1.0, what="the difference"),
+        CONTRADICTS,
+    )
 
 
 def mean_season(one) -> dict:
@@ -218,6 +296,17 @@ def mean_season(one) -> dict:
     return {"days": one.evaluation.growing_season_days.mean()}
 
 
-CLAIMS = (conifer_fractions, gated_has_more_conifers, gated_is_denser, curriculum_is_denser, eupg_does_little,
-          early_growth, gated_fails_permafrost, curriculum_protects, eupg_keeps_old_trees,
-          density_generalises, gradient_dominance, longer_season)  # fmt: skip
+CLAIMS = (
+    conifer_fractions,
+    gated_has_more_conifers,
+    gated_is_denser,
+    curriculum_is_denser,
+    eupg_does_little,
+    early_growth,
+    gated_fails_permafrost,
+    curriculum_protects,
+    eupg_keeps_old_trees,
+    density_generalises,
+    gradient_dominance,
+    longer_season,
+)

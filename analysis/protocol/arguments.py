@@ -95,8 +95,9 @@ def not_default(args) -> dict:
     default = type(args)(**given)
     resolve(default)
     alike = {"seed", *FREE_ARGUMENTS} | ({"eval_weights"} if hasattr(args, "preference") else set())
-    changed = {name: value for name, value in vars(args).items()
-               if name not in alike and value != getattr(default, name)}
+    changed = {
+        name: value for name, value in vars(args).items() if name not in alike and value != getattr(default, name)
+    }
     if given.get("vectorization", "async") != "async":
         changed["vectorization"] = args.vectorization
     return changed
@@ -137,8 +138,10 @@ def prepare(args) -> dict:
         fail(f"--vectorization lockstep: only {', '.join(MODES)} can keep a --preference so; async has no need of it")
 
     if hasattr(args, "rollout_steps") and args.rollout_steps % args.num_envs:
-        fail(f"--rollout-steps {args.rollout_steps}, a sum over all environments, must be a multiple of "
-             f"--num-envs {args.num_envs}")
+        fail(
+            f"--rollout-steps {args.rollout_steps}, a sum over all environments, must be a multiple of "
+            f"--num-envs {args.num_envs}"
+        )
     if hasattr(args, "total_timesteps") and args.total_timesteps < args.num_envs:
         fail(f"--total-timesteps {args.total_timesteps} must be at least --num-envs {args.num_envs}")
     for package in getattr(args, "track", ()):

@@ -24,8 +24,17 @@ FIRST_EVALUATION_SEED = 1_000_000_000
 CHUNK = 128
 
 EVALUATION_INFO = ("growing_season_days", "latent_heat_mj_m2", "ground_shortwave_mj_m2")
-EVALUATION_COLUMNS = ("policy", "preference", "episode", "seed", "site_seed", "carbon_return", "thaw_return",
-                      "scalarized_return", *EVALUATION_INFO)
+EVALUATION_COLUMNS = (
+    "policy",
+    "preference",
+    "episode",
+    "seed",
+    "site_seed",
+    "carbon_return",
+    "thaw_return",
+    "scalarized_return",
+    *EVALUATION_INFO,
+)
 # One more column for agents trained on another thaw formulation: the thaw return of the same episodes under it.
 ASYMMETRIC = "asymmetric_thaw_return"
 
@@ -41,13 +50,16 @@ def as_mask(answer, env_id: str) -> np.ndarray:
     """What an environment's action_masks() gave, as bool (25,); ValueError if no action is valid."""
     mask = np.asarray(answer).astype(bool)
     if mask.shape != (25,) or not mask.any():
-        raise ValueError(f"--env-id {env_id}: action_masks() must give 25 values, at least one of them true, "
-                         f"not {np.array2string(np.asarray(answer), threshold=30)}")
+        raise ValueError(
+            f"--env-id {env_id}: action_masks() must give 25 values, at least one of them true, "
+            f"not {np.array2string(np.asarray(answer), threshold=30)}"
+        )
     return mask
 
 
 def final_info(infos: dict, i: int, keys) -> dict:
     """What environment i reported under these keys at its episode's end (gymnasium's SAME_STEP layout)."""
+
     def of_one(values):
         if isinstance(values, dict):
             return {key: of_one(value) for key, value in values.items() if not key.startswith("_")}
@@ -70,10 +82,12 @@ class PlainLoop(gym.vector.VectorEnv):
     def reset(self, *, seed: list[int], options: dict):
         """seed: one per environment; options: preference, one per environment."""
         self.ended, self.answers = np.zeros(self.num_envs, dtype=bool), [None] * self.num_envs
-        self.observations = np.stack([
-            env.reset(seed=env_seed, options={"preference": preference})[0]
-            for env, env_seed, preference in zip(self.envs, seed, options["preference"], strict=True)
-        ])
+        self.observations = np.stack(
+            [
+                env.reset(seed=env_seed, options={"preference": preference})[0]
+                for env, env_seed, preference in zip(self.envs, seed, options["preference"], strict=True)
+            ]
+        )
         return self.observations.copy(), {}
 
     def step(self, actions: np.ndarray):
@@ -150,29 +164,37 @@ def evaluate(args, env_kwargs: dict, policy, weights=None, policies=POLICIES):
     """
     weights = args.eval_weights if weights is None else weights
     # A greedy policy in site-specific mode does the same in every episode.
-    episodes = {kind: 1 if kind == "greedy" and args.mode == "site-specific" else args.eval_episodes
-                for kind in policies}
+    episodes = {
+        kind: 1 if kind == "greedy" and args.mode == "site-specific" else args.eval_episodes for kind in policies
+    }
     progress = Progress("evaluation", sum(episodes.values()) * len(weights), "episodes")
     rows, years = [], []
     for kind in policies:
         jobs = [(weight, episode) for weight in weights for episode in range(episodes[kind])]
         records = {weight: [] for weight in weights}
         for start in range(0, len(jobs), CHUNK):
-            chunk = jobs[start:start + CHUNK]
+            chunk = jobs[start : start + CHUNK]
             chunk_weights = np.array([weight for weight, _ in chunk])
             seeds = [FIRST_EVALUATION_SEED + episode for _, episode in chunk]
             with contextlib.closing(make_envs(args.env_id, env_kwargs, len(chunk))) as envs:
                 returns, reports = play(envs, args.env_id, policy, chunk_weights, seeds, kind == "greedy")
-            for (weight, episode), seed, (carbon, thaw), report in zip(
-                chunk, seeds, returns, reports, strict=True
-            ):
+            for (weight, episode), seed, (carbon, thaw), report in zip(chunk, seeds, returns, reports, strict=True):
                 if "years" in report:
                     records[weight].append(report.pop("years"))
                 if args.thaw_formulation != "asymmetric":
                     report[ASYMMETRIC] = asymmetric_thaw_return(records[weight][-1])
-                rows.append({"policy": kind, "preference": weight, "episode": episode, "seed": seed,
-                             "carbon_return": carbon, "thaw_return": thaw,
-                             "scalarized_return": scalarize(carbon, thaw, weight), **report})
+                rows.append(
+                    {
+                        "policy": kind,
+                        "preference": weight,
+                        "episode": episode,
+                        "seed": seed,
+                        "carbon_return": carbon,
+                        "thaw_return": thaw,
+                        "scalarized_return": scalarize(carbon, thaw, weight),
+                        **report,
+                    }
+                )
             progress.show(len(rows))
         years += [summarize_years(kind, weight, record) for weight, record in records.items() if record]
     other_formulation = (ASYMMETRIC,) if args.thaw_formulation != "asymmetric" else ()
@@ -182,8 +204,9 @@ def evaluate(args, env_kwargs: dict, policy, weights=None, policies=POLICIES):
 
 def asymmetric_thaw_return(record: dict) -> float:
     """Thaw return of an episode's annual record under the paper's asymmetric reward, whatever it was played for."""
-    rewards = boreal_env.thaw_reward(record["boundary_cooling_mj_m2"], record["boundary_warming_mj_m2"],
-                                     boreal_env.Reward(), "asymmetric")
+    rewards = boreal_env.thaw_reward(
+        record["boundary_cooling_mj_m2"], record["boundary_warming_mj_m2"], boreal_env.Reward(), "asymmetric"
+    )
     return float(np.clip(rewards, -1, 1).sum())
 
 
@@ -194,10 +217,12 @@ def summarize_years(policy: str, weight: float, records: list[dict]) -> pd.DataF
     values = np.array([[record[name] for name in names] for record in records])
     low, median, high = np.percentile(values, [10, 50, 90], axis=0)
     columns = {"mean": values.mean(axis=0), "sd": values.std(axis=0), "p10": low, "p50": median, "p90": high}
-    return pd.DataFrame({
-        "policy": policy,
-        "preference": weight,
-        "year": np.repeat(np.arange(1, values.shape[2] + 1), len(names)),
-        "variable": np.tile(names, values.shape[2]),
-        **{name: column.T.ravel() for name, column in columns.items()},
-    })
+    return pd.DataFrame(
+        {
+            "policy": policy,
+            "preference": weight,
+            "year": np.repeat(np.arange(1, values.shape[2] + 1), len(names)),
+            "variable": np.tile(names, values.shape[2]),
+            **{name: column.T.ravel() for name, column in columns.items()},
+        }
+    )

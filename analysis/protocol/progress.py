@@ -31,8 +31,10 @@ class Progress:
             return
         self.shown = now
         rate = (done - self.done_before) / (now - self.start)
-        line = (f"{self.label} {done:,}/{self.total:,} {self.unit}, {rate:,.0f}/s, "
-                f"{(self.total - done) / rate / 60:.1f} min left")
+        line = (
+            f"{self.label} {done:,}/{self.total:,} {self.unit}, {rate:,.0f}/s, "
+            f"{(self.total - done) / rate / 60:.1f} min left"
+        )
         if self.returns:
             carbon, thaw = np.mean(self.returns, axis=0)
             line += f", carbon {carbon:+.2f}, thaw {thaw:+.2f}"

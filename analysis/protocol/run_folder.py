@@ -32,8 +32,17 @@ except ImportError:  # Windows, where a folder is not locked
     fcntl = None
 
 EPISODE_INFO = ("final_density", "mean_density", "final_conifer_fraction", "mean_conifer_fraction")
-EPISODE_COLUMNS = ("global_step", "episode", "env", "site_seed", "preference", "carbon_return", "thaw_return",
-                   "scalarized_return", *EPISODE_INFO)
+EPISODE_COLUMNS = (
+    "global_step",
+    "episode",
+    "env",
+    "site_seed",
+    "preference",
+    "carbon_return",
+    "thaw_return",
+    "scalarized_return",
+    *EPISODE_INFO,
+)
 TIMING_COLUMNS = ("phase", "global_step", "seconds", "elapsed_seconds")
 # What a run makes, but for config.json and timing.csv. The first of them makes it a finished run.
 RESULTS = ("evaluation.csv", "checkpoint.pt", "episodes.csv", "updates.csv", "evaluation_years.csv", "summary.png")
@@ -72,15 +81,19 @@ class Table:
 
     def write(self, row: dict) -> None:
         """Append a row; columns that it lacks stay empty, one that the table lacks raises ValueError."""
-        self._append({name: FLOAT_FORMAT % value if isinstance(value, (float, np.floating)) else value
-                      for name, value in row.items()})
+        self._append(
+            {
+                name: FLOAT_FORMAT % value if isinstance(value, (float, np.floating)) else value
+                for name, value in row.items()
+            }
+        )
 
     def _append(self, row: dict) -> None:
         text = io.StringIO()
         csv.DictWriter(text, self.columns, lineterminator="\n").writerow(row)
         data = text.getvalue().encode()
         while data:
-            data = data[self.file.write(data):]
+            data = data[self.file.write(data) :]
 
 
 class Run:
@@ -107,8 +120,10 @@ class Run:
             self._claim_folder()
             self._load_checkpoint()
             sizes = self.checkpoint["table_sizes"] if self.checkpoint else {}
-            self.tables |= {name: Table(self.folder / f"{name}.csv", columns, sizes.get(name, 0))
-                            for name, columns in tables.items()}
+            self.tables |= {
+                name: Table(self.folder / f"{name}.csv", columns, sizes.get(name, 0))
+                for name, columns in tables.items()
+            }
         self.trackers = tracking.start(args, script, self.folder, self.config, self.checkpoint_step)
         print(f"{script}: {args.env_id}, seed {args.seed}, into {self.folder}", flush=True)
         if self.checkpoint:
@@ -162,8 +177,10 @@ class Run:
             fail(f"{config_file} is damaged ({error!r}); --overwrite starts over")
         here = json.loads(json.dumps({"script": self.script, **self.config["arguments"]}))
         if there != here:
-            fail(f"{self.folder} holds a run with other arguments: {differences(there, here)} "
-                 "(--run-dir names another folder, --overwrite starts over)")
+            fail(
+                f"{self.folder} holds a run with other arguments: {differences(there, here)} "
+                "(--run-dir names another folder, --overwrite starts over)"
+            )
         if (self.folder / "evaluation.csv").exists():
             print(f"{self.folder}: this run is finished (--overwrite starts over)")
             sys.exit(0)
@@ -249,8 +266,14 @@ class Run:
     def time(self, phase: str, global_step: int, seconds: float) -> None:
         """Append to timing.csv, the only file that depends on the clock."""
         with self._writing():
-            self.tables["timing"].write({"phase": phase, "global_step": global_step, "seconds": seconds,
-                                         "elapsed_seconds": time.perf_counter() - self.start})
+            self.tables["timing"].write(
+                {
+                    "phase": phase,
+                    "global_step": global_step,
+                    "seconds": seconds,
+                    "elapsed_seconds": time.perf_counter() - self.start,
+                }
+            )
 
     def finish(self, evaluation: pd.DataFrame, years: pd.DataFrame | None) -> None:
         """Write the evaluation and the picture, print the table, and so declare the run finished."""
@@ -285,8 +308,11 @@ class Run:
         for table in self.tables.values():
             table.file.close()
         self.lock.close()
-        then = f"the same command goes on from step {self.checkpoint_step:,}" if self.checkpoint_step else \
-            "the same command starts it again"
+        then = (
+            f"the same command goes on from step {self.checkpoint_step:,}"
+            if self.checkpoint_step
+            else "the same command starts it again"
+        )
         if isinstance(error, KeyboardInterrupt):
             print(f"\n{self.folder}: interrupted; {then}", file=sys.stderr)
             sys.exit(130)
@@ -326,19 +352,24 @@ def remove(path: Path) -> None:
 
 def differences(there: dict, here: dict) -> str:
     """What differs between two dicts, by name."""
-    return "; ".join(f"{name} {there.get(name)} there, {here.get(name)} now"
-                     for name in {**there, **here} if there.get(name) != here.get(name))
+    return "; ".join(
+        f"{name} {there.get(name)} there, {here.get(name)} now"
+        for name in {**there, **here}
+        if there.get(name) != here.get(name)
+    )
 
 
 def folder_name(env_id: str, changed: dict) -> str:
     """Environment and name=value of what is not default; the end of a name too long for file systems is its hash."""
-    values = {name: ",".join(f"{v:g}" for v in value) if isinstance(value, tuple) else value
-              for name, value in changed.items()}
+    values = {
+        name: ",".join(f"{v:g}" for v in value) if isinstance(value, tuple) else value
+        for name, value in changed.items()
+    }
     name = "-".join([env_id.split(":")[-1].replace("/", "-"), *(f"{k}={v}" for k, v in values.items())])
     if len(name.encode()) <= LONGEST_NAME:
         return name
     digest = hashlib.sha256(name.encode()).hexdigest()[:12]
-    return f"{name.encode()[:LONGEST_NAME - 13].decode(errors='ignore')}-{digest}"
+    return f"{name.encode()[: LONGEST_NAME - 13].decode(errors='ignore')}-{digest}"
 
 
 def versions() -> dict:

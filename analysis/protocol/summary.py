@@ -20,12 +20,16 @@ def print_table(evaluation: pd.DataFrame) -> None:
     print("carbon       sampled policy                greedy policy")
     print("weight   carbon    thaw  scalarized   carbon    thaw  scalarized")
     for weight in sampled.index:
-        print(f"{weight:6.2f}" + "".join("{:9.2f}{:8.2f}{:12.2f}".format(*table.loc[weight])
-                                         for table in (sampled, greedy)))
+        print(
+            f"{weight:6.2f}"
+            + "".join("{:9.2f}{:8.2f}{:12.2f}".format(*table.loc[weight]) for table in (sampled, greedy))
+        )
     print("  mean" + "".join("{:9.2f}{:8.2f}{:12.2f}".format(*table.mean()) for table in (sampled, greedy)))
     front = sampled[metrics.OBJECTIVES].to_numpy()
-    print(f"sampled policy: hypervolume {metrics.hypervolume(front):.2f} above {metrics.REFERENCE_POINT}, "
-          f"sparsity {metrics.sparsity(front):.3g}\n")
+    print(
+        f"sampled policy: hypervolume {metrics.hypervolume(front):.2f} above {metrics.REFERENCE_POINT}, "
+        f"sparsity {metrics.sparsity(front):.3g}\n"
+    )
 
 
 def draw_summary(file, title: str, evaluation: pd.DataFrame, years: pd.DataFrame | None, episodes: Path):
@@ -53,8 +57,11 @@ def _draw_learning(axes, episodes: pd.DataFrame) -> None:
 
 
 def _draw_years(axes, years: pd.DataFrame) -> None:
-    labels = {"density_stems_ha": "density (stems/ha)", "conifer_fraction": "conifer fraction",
-              "biomass_kgc_m2": "biomass (kgC/m2)"}
+    labels = {
+        "density_stems_ha": "density (stems/ha)",
+        "conifer_fraction": "conifer fraction",
+        "biomass_kgc_m2": "biomass (kgC/m2)",
+    }
     one_policy = years[(years.policy == "sampled") & (years.preference == years.preference.max())]
     for ax, (variable, label) in zip(axes, labels.items(), strict=True):
         rows = one_policy[one_policy.variable == variable]
@@ -67,12 +74,25 @@ def _draw_years(axes, years: pd.DataFrame) -> None:
 def _draw_trade_off(figure, ax, evaluation: pd.DataFrame) -> None:
     for policy, marker in (("sampled", "o"), ("greedy", "^")):
         means = metrics.mean_returns(evaluation[evaluation.policy == policy])
-        points = ax.scatter(means.thaw_return, means.carbon_return, c=means.index, vmin=0, vmax=1,
-                            marker=marker, edgecolors="black", linewidths=0.5)
+        points = ax.scatter(
+            means.thaw_return,
+            means.carbon_return,
+            c=means.index,
+            vmin=0,
+            vmax=1,
+            marker=marker,
+            edgecolors="black",
+            linewidths=0.5,
+        )
         ax.plot([], [], marker, color="white", markeredgecolor="black", label=f"{policy} policy")
         for weight in (means.index[0], means.index[-1]):
-            ax.annotate(f"{weight:g}", means.loc[weight, ["thaw_return", "carbon_return"]], xytext=(5, 5),
-                        textcoords="offset points", fontsize=8)
+            ax.annotate(
+                f"{weight:g}",
+                means.loc[weight, ["thaw_return", "carbon_return"]],
+                xytext=(5, 5),
+                textcoords="offset points",
+                fontsize=8,
+            )
     ax.set(xlabel="mean thaw return", ylabel="mean carbon return", title="evaluation, one point per weight")
     ax.locator_params(nbins=6)
     ax.ticklabel_format(useOffset=False)

@@ -9,8 +9,11 @@ FOLDERS = ("tensorboard", "wandb")  # of a run's folder, named like the trackers
 
 def numbers(table: str, row: dict) -> dict:
     """The row's numbers, under names such as episodes/carbon_return."""
-    return {f"{table}/{name}": float(value) for name, value in row.items()
-            if isinstance(value, (int, float, np.number)) and name != "global_step"}
+    return {
+        f"{table}/{name}": float(value)
+        for name, value in row.items()
+        if isinstance(value, (int, float, np.number)) and name != "global_step"
+    }
 
 
 def start(args, script: str, folder: Path, config: dict, first_step: int) -> list:
@@ -41,8 +44,14 @@ def wandb(args, script, folder, config, first_step):
     import wandb
 
     identity = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()[:16]
-    wandb.init(project=args.wandb_project_name, name=f"{script}-{args.env_id}-{args.seed}", config=config,
-               dir=str(folder), id=identity, resume="allow")
+    wandb.init(
+        project=args.wandb_project_name,
+        name=f"{script}-{args.env_id}-{args.seed}",
+        config=config,
+        dir=str(folder),
+        id=identity,
+        resume="allow",
+    )
 
     def track(table: str, row: dict) -> None:
         wandb.log({"global_step": row["global_step"], **numbers(table, row)})

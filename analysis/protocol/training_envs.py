@@ -87,8 +87,10 @@ def make_training_envs(args, env_kwargs: dict) -> gym.vector.VectorEnv:
     preference = None if args.env_id in MODES else getattr(args, "preference", None)
     make = [partial(make_env, args.env_id, i, preference, env_kwargs) for i in range(args.num_envs)]
     # Ctrl-C reaches all processes of a terminal: the workers leave it to the main one, which then ends them
-    handlers = {number: signal.signal(number, handler)
-                for number, handler in ((signal.SIGINT, signal.SIG_IGN), (signal.SIGTERM, signal.SIG_DFL))}
+    handlers = {
+        number: signal.signal(number, handler)
+        for number, handler in ((signal.SIGINT, signal.SIG_IGN), (signal.SIGTERM, signal.SIG_DFL))
+    }
     try:
         return gym.vector.AsyncVectorEnv(make, autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
     except (EOFError, ConnectionError):

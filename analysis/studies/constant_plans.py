@@ -41,6 +41,7 @@ def study(env_id: str, episodes: int) -> pd.DataFrame:
     args = SimpleNamespace(env_id=env_id, mode="generalist", thaw_formulation="asymmetric", eval_episodes=episodes)
     tables = []
     for action in PLANTING:
+
         def probabilities(observations, masks, accrued_returns, action=action):
             return np.eye(sim.management.NUM_ACTIONS)[where_valid(masks, action)]
 
@@ -60,8 +61,11 @@ def study_of_sites(seeds) -> pd.DataFrame:
                 valid = protocol.action_masks(envs, observations, ONE_SITE)[actions, actions]
                 observations, rewards, *_ = envs.step(np.where(valid, actions, boreal_env.NO_CHANGE))
                 returns += rewards
-        tables.append(pd.DataFrame({"site_seed": seed, "action": actions, "carbon_return": returns[:, 0],
-                                    "thaw_return": returns[:, 1]}))  # fmt: skip
+        tables.append(
+            pd.DataFrame(
+                {"site_seed": seed, "action": actions, "carbon_return": returns[:, 0], "thaw_return": returns[:, 1]}
+            )
+        )
     return pd.concat(tables, ignore_index=True)
 
 
@@ -92,10 +96,12 @@ def main(args: Args) -> None:
     sites = experiments.SITE_SEEDS[: 1 if args.quick else None]
     physics = open_loop.fingerprint()
     tables = {
-        "constant_plans": ({"episodes": args.eval_episodes, "actions": PLANTING, "physics": physics}, lambda: pd.concat(
-            [study(env_id, args.eval_episodes) for env_id in ENVIRONMENTS])),
+        "constant_plans": (
+            {"episodes": args.eval_episodes, "actions": PLANTING, "physics": physics},
+            lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in ENVIRONMENTS]),
+        ),
         "constant_plans_of_sites": ({"sites": sites, "physics": physics}, lambda: study_of_sites(sites)),
-    }  # fmt: skip
+    }
     for name, (settings, make) in tables.items():
         path = folder / f"{name}.csv"
         if stored.is_finished(path, settings):

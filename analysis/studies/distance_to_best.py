@@ -110,13 +110,17 @@ def hypervolume_share(points: np.ndarray, plans: np.ndarray) -> float:
 
 def constant_plans(plans: dict[int, pd.DataFrame], weights) -> pd.DataFrame:
     """At each weight the constant plan that is best on a site, and the one that is best on average over the sites."""
-    means = pd.concat({site: table[table.kind == "constant"].groupby("actions")[GAINS].mean()
-                       for site, table in plans.items()}, names=["site"])  # fmt: skip
+    means = pd.concat(
+        {site: table[table.kind == "constant"].groupby("actions")[GAINS].mean() for site, table in plans.items()},
+        names=["site"],
+    )
     rows = []
     for weight in weights:
         scalarized = protocol.scalarize(means[GAINS[0]], means[GAINS[1]], weight).unstack("actions")
-        for method, chosen in ((BEST_OF_SITE, scalarized.idxmax(axis=1)),
-                               (BEST_OF_ALL, dict.fromkeys(plans, scalarized.mean().idxmax()))):  # fmt: skip
+        for method, chosen in (
+            (BEST_OF_SITE, scalarized.idxmax(axis=1)),
+            (BEST_OF_ALL, dict.fromkeys(plans, scalarized.mean().idxmax())),
+        ):
             for site, table in plans.items():
                 plan = table[(table.kind == "constant") & (table.actions == chosen[site])]
                 gains = plan.sort_values("weather")[GAINS].to_numpy()
@@ -186,8 +190,10 @@ def judge(policy, kwargs: dict, plans: dict[int, pd.DataFrame], weights, learnt:
         for k, site in enumerate(sites):
             first = plans[site].drop_duplicates("weather").set_index("weather").loc[weathers]
             zero = first[RETURNS].to_numpy() - first[GAINS].to_numpy()
-            rows += [{"site": site, "policy": kind, "weight": weight, **means_of(returns[j, k] - zero, weight)}
-                     for j, weight in enumerate(weights)]  # fmt: skip
+            rows += [
+                {"site": site, "policy": kind, "weight": weight, **means_of(returns[j, k] - zero, weight)}
+                for j, weight in enumerate(weights)
+            ]
     return pd.DataFrame(rows)
 
 
@@ -233,8 +239,14 @@ def name_of(config: dict) -> dict:
     """The columns AGENT and run of a run's config.json."""
     arguments = config["arguments"]
     text = json.dumps(config, sort_keys=True)
-    names = (config["script"], arguments["env_id"], runs.setting(config["not_default"], arguments["env_id"]),
-             arguments["seed"], arguments["site_seed"], arguments.get("preference"))  # fmt: skip
+    names = (
+        config["script"],
+        arguments["env_id"],
+        runs.setting(config["not_default"], arguments["env_id"]),
+        arguments["seed"],
+        arguments["site_seed"],
+        arguments.get("preference"),
+    )
     as_text = ["" if value is None else str(value) for value in names]
     return dict(zip(AGENT, as_text, strict=True)) | {"run": hashlib.sha256(text.encode()).hexdigest()[:12]}
 
@@ -316,8 +328,10 @@ def main(args: Args) -> None:
     constant = constant_plans(plans, weights).assign(run="")
     table = table[~table.method.isin((BEST_OF_SITE, BEST_OF_ALL))]
     table = pd.concat([table, constant.assign(**dict.fromkeys(AGENT[1:], ""))], ignore_index=True)
-    todo = [(dict.fromkeys([*AGENT, "run"], "") | {"method": name}, (strategy(name), {}), weights)
-            for name in experiments.HEURISTICS]  # fmt: skip
+    todo = [
+        (dict.fromkeys([*AGENT, "run"], "") | {"method": name}, (strategy(name), {}), weights)
+        for name in experiments.HEURISTICS
+    ]
     for folder, config in agents(args.runs_dir or (experiments.QUICK_DIR if args.quick else runs.RUNS_DIR), plans):
         own = (config["arguments"]["preference"],) if "preference" in config["arguments"] else weights
         todo.append((name_of(config), (folder, config), own))

@@ -30,8 +30,14 @@ QUICK = Budget(population=16, generations=3, weathers=1, report_weathers=2)
 ALL_ON = "all on"
 RETURNS = [f"{name}_return" for name in open_loop.OBJECTIVES]
 GAINS = [f"{name}_gain" for name in open_loop.OBJECTIVES]
-STAND = ["density_stems_ha", "conifer_fraction", "planted_stems_ha", "planted_conifers_ha", "thinned_stems_ha",
-         "clipped_thaw_years"]  # fmt: skip
+STAND = [
+    "density_stems_ha",
+    "conifer_fraction",
+    "planted_stems_ha",
+    "planted_conifers_ha",
+    "thinned_stems_ha",
+    "clipped_thaw_years",
+]
 
 
 @dataclass
@@ -88,9 +94,13 @@ def study(site_seed: int, budget: Budget, seed: int, years: int, mechanisms=None
     )
     table[RETURNS] = episodes.returns()
     values = (
-        episodes.last("density_stems_ha"), episodes.last("conifer_fraction"), episodes.total("planted_stems_ha"),
-        episodes.planted_conifers(), episodes.total("thinned_stems_ha"), episodes.clipped_years()[:, 1],
-    )  # fmt: skip
+        episodes.last("density_stems_ha"),
+        episodes.last("conifer_fraction"),
+        episodes.total("planted_stems_ha"),
+        episodes.planted_conifers(),
+        episodes.total("thinned_stems_ha"),
+        episodes.clipped_years()[:, 1],
+    )
     table[STAND] = np.column_stack(values)
     return table
 
@@ -129,13 +139,19 @@ def summarise(table: pd.DataFrame) -> dict:
     gains = with_gains(table)
     front, constant = plan_means(gains, "front"), plan_means(gains, "constant")
     ends = {"thaw_end": front.iloc[0], "carbon_end": front.iloc[-1]}
-    by_weather = {end: gains[(gains.kind == "front") & (gains.actions == plan.name)].set_index("weather")[GAINS]
-                  for end, plan in ends.items()}  # fmt: skip
+    by_weather = {
+        end: gains[(gains.kind == "front") & (gains.actions == plan.name)].set_index("weather")[GAINS]
+        for end, plan in ends.items()
+    }
     apart = by_weather["carbon_end"] - by_weather["thaw_end"]
     errors = apart.std() / np.sqrt(len(apart))
     zero = (gains[RETURNS].to_numpy() - gains[GAINS].to_numpy()).mean(axis=0)
-    summary = {"zero_carbon": zero[0], "zero_thaw": zero[1], "points": len(front),
-               "clipped_thaw_years": front.clipped_thaw_years.mean()}  # fmt: skip
+    summary = {
+        "zero_carbon": zero[0],
+        "zero_thaw": zero[1],
+        "points": len(front),
+        "clipped_thaw_years": front.clipped_thaw_years.mean(),
+    }
     for name, gain in zip(open_loop.OBJECTIVES, GAINS, strict=True):
         summary[f"{name}_extent"] = abs(apart[gain].mean())
         summary[f"{name}_extent_error"] = errors[gain]
@@ -191,8 +207,14 @@ def main(args: Args) -> None:
         sys.exit(f"fronts.py: --sites {args.sites}: 1 to {most} are allowed")
     budget = QUICK if args.quick else SMALL if args.without_mechanisms else FULL
     folder, todo = folder_of(args), cases(args)
-    settings = {"budget": budget._asdict(), "seed": args.seed, "years": YEARS, "block_years": BLOCK_YEARS,
-                "columns": RETURNS + STAND, "physics": open_loop.fingerprint()}  # fmt: skip
+    settings = {
+        "budget": budget._asdict(),
+        "seed": args.seed,
+        "years": YEARS,
+        "block_years": BLOCK_YEARS,
+        "columns": RETURNS + STAND,
+        "physics": open_loop.fingerprint(),
+    }
     finished = {case: stored.is_finished(path_of(folder, *case), settings | {"case": case}) for case in todo}
     print(f"{sum(finished.values())} of {len(todo)} fronts are there, in {folder}", flush=True)
     each = most_episodes(budget)
@@ -212,9 +234,15 @@ def main(args: Args) -> None:
         done = (k + 1) * each
         progress.show(done)
 
-    rows = [{"site_seed": site_seed, "off": mechanism, **describe(site_seed),
-             **summarise(stored.read(path_of(folder, site_seed, mechanism), text=("actions",)))}
-            for site_seed, mechanism in todo]  # fmt: skip
+    rows = [
+        {
+            "site_seed": site_seed,
+            "off": mechanism,
+            **describe(site_seed),
+            **summarise(stored.read(path_of(folder, site_seed, mechanism), text=("actions",))),
+        }
+        for site_seed, mechanism in todo
+    ]
     summary = pd.DataFrame(rows)
     stored.write(folder / "summary.csv", summary, settings | {"arguments": {**asdict(args), "output_dir": None}})
     print_summary(summary)
@@ -222,18 +250,24 @@ def main(args: Args) -> None:
 
 def print_summary(summary: pd.DataFrame) -> None:
     """The summary, a line a front."""
-    print("\n                              boundary  snow    zero change    extent +- error                   clipped"
-          "   gains and conifer share at")  # fmt: skip
-    print("site        off             - air [K]  [mm]  carbon   thaw   carbon        thaw    points timing  years"
-          "   the thaw end        the carbon end")  # fmt: skip
+    print(
+        "\n                              boundary  snow    zero change    extent +- error                   clipped"
+        "   gains and conifer share at"
+    )
+    print(
+        "site        off             - air [K]  [mm]  carbon   thaw   carbon        thaw    points timing  years"
+        "   the thaw end        the carbon end"
+    )
     for row in summary.itertuples():
-        print(f"{row.site_seed}  {row.off:17s} {row.boundary_above_air_k:7.1f} {row.snow_mm_day:5.2f} "
-              f"{row.zero_carbon:+7.2f} {row.zero_thaw:+6.1f} "
-              f"{row.carbon_extent:6.2f} +-{row.carbon_extent_error:4.2f} {row.thaw_extent:5.2f} "
-              f"+-{row.thaw_extent_error:4.2f} {row.points:4d} {row.timing_share:6.0%} {row.clipped_thaw_years:6.1f}   "
-              f"{row.thaw_end_carbon_gain:+5.2f} {row.thaw_end_thaw_gain:+6.2f} {row.thaw_end_conifer_share:4.0%}   "
-              f"{row.carbon_end_carbon_gain:+5.2f} {row.carbon_end_thaw_gain:+6.2f} "
-              f"{row.carbon_end_conifer_share:4.0%}")  # fmt: skip
+        print(
+            f"{row.site_seed}  {row.off:17s} {row.boundary_above_air_k:7.1f} {row.snow_mm_day:5.2f} "
+            f"{row.zero_carbon:+7.2f} {row.zero_thaw:+6.1f} "
+            f"{row.carbon_extent:6.2f} +-{row.carbon_extent_error:4.2f} {row.thaw_extent:5.2f} "
+            f"+-{row.thaw_extent_error:4.2f} {row.points:4d} {row.timing_share:6.0%} {row.clipped_thaw_years:6.1f}   "
+            f"{row.thaw_end_carbon_gain:+5.2f} {row.thaw_end_thaw_gain:+6.2f} {row.thaw_end_conifer_share:4.0%}   "
+            f"{row.carbon_end_carbon_gain:+5.2f} {row.carbon_end_thaw_gain:+6.2f} "
+            f"{row.carbon_end_conifer_share:4.0%}"
+        )
 
 
 if __name__ == "__main__":

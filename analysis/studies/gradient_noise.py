@@ -104,8 +104,9 @@ def advantages(rewards: np.ndarray, utility: str, baseline: str) -> np.ndarray:
 
 def gradients(agent, inputs, masks, actions, weights) -> np.ndarray:
     """Gradients (k, parameters) of an episode's mean log-probability, weighted by each row of weights (k, years)."""
-    log_probability = agent.get_action_and_value(torch.from_numpy(inputs), torch.from_numpy(masks),
-                                                 torch.from_numpy(actions))[1]  # fmt: skip
+    log_probability = agent.get_action_and_value(
+        torch.from_numpy(inputs), torch.from_numpy(masks), torch.from_numpy(actions)
+    )[1]
     outputs = torch.from_numpy((weights / weights.shape[1]).astype(np.float32))
     parts = torch.autograd.grad(log_probability, list(agent.parameters()), outputs, is_grads_batched=True)
     return torch.cat([part.flatten(start_dim=1) for part in parts], dim=1).numpy()
@@ -124,8 +125,12 @@ def signal_and_noise(means: np.ndarray, squares: np.ndarray) -> dict[str, float]
     signal = (all_products - own.sum()) / (number * (number - 1))
     without = (all_products - 2 * (means @ total) + own - (own.sum() - own)) / ((number - 1) * (number - 2))
     error = ((number - 1) / number * ((without - without.mean()) ** 2).sum()) ** 0.5
-    return {"signal": signal, "signal_low": signal - Z * error, "signal_high": signal + Z * error,
-            "noise": squares.mean() - signal}  # fmt: skip
+    return {
+        "signal": signal,
+        "signal_low": signal - Z * error,
+        "signal_high": signal + Z * error,
+        "noise": squares.mean() - signal,
+    }
 
 
 def with_episodes(table: pd.DataFrame) -> pd.DataFrame:
@@ -159,34 +164,54 @@ def study(design: Design) -> pd.DataFrame:
     for site in range(design.sites):
         for k in range(design.episodes):
             weights = np.moveaxis(of_case[site, k], -1, 0)  # (2, cases, years)
-            both = gradients(agent, episodes.inputs[site, k], episodes.masks[site, k], episodes.actions[site, k],
-                             weights.reshape(-1, design.years)).reshape(2, len(cases), -1)  # fmt: skip
+            both = gradients(
+                agent,
+                episodes.inputs[site, k],
+                episodes.masks[site, k],
+                episodes.actions[site, k],
+                weights.reshape(-1, design.years),
+            ).reshape(2, len(cases), -1)
             own = protocol.scalarize(*both, episodes.preferences[site, k].astype(np.float32))
             gradient = np.stack([*both, own], axis=1)
             means[:, :, site] += gradient / design.episodes
             squares[:, :, site, k] = (gradient.astype(np.float64) ** 2).sum(axis=-1)
         progress.show(site + 1)
-    return with_episodes(pd.DataFrame([
-        {"utility": utility, "baseline": baseline, "objective": objective,
-         **signal_and_noise(means[case, which], squares[case, which])}
-        for case, (utility, baseline) in enumerate(cases) for which, objective in enumerate(OBJECTIVES)
-    ]))  # fmt: skip
+    return with_episodes(
+        pd.DataFrame(
+            [
+                {
+                    "utility": utility,
+                    "baseline": baseline,
+                    "objective": objective,
+                    **signal_and_noise(means[case, which], squares[case, which]),
+                }
+                for case, (utility, baseline) in enumerate(cases)
+                for which, objective in enumerate(OBJECTIVES)
+            ]
+        )
+    )
 
 
 def report(table: pd.DataFrame) -> None:
     """Print the episodes at which signal and noise are equal."""
     print("\nEpisodes whose mean gradient has as much signal as noise (95 % interval over sites)")
     for row in table.itertuples():
-        print(f"{row.utility:7s} {row.baseline:18s} {row.objective:11s} {row.episodes:10,.0f} "
-              f"[{row.episodes_low:,.0f}, {row.episodes_high:,.0f}]")  # fmt: skip
+        print(
+            f"{row.utility:7s} {row.baseline:18s} {row.objective:11s} {row.episodes:10,.0f} "
+            f"[{row.episodes_low:,.0f}, {row.episodes_high:,.0f}]"
+        )
 
 
 def main(args: Args) -> None:
     """Play and analyse, unless the table is there."""
     design = QUICK if args.quick else FULL
     path = (results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR) / "gradient_noise.csv"
-    settings = {**design._asdict(), "agent_seed": AGENT_SEED, "first_seed": FIRST_SEED,
-                "physics": open_loop.fingerprint()}  # fmt: skip
+    settings = {
+        **design._asdict(),
+        "agent_seed": AGENT_SEED,
+        "first_seed": FIRST_SEED,
+        "physics": open_loop.fingerprint(),
+    }
     if stored.is_finished(path, settings):
         print(f"{path} is finished")
         report(stored.read(path))

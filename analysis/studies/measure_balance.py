@@ -73,8 +73,10 @@ def main(args: Args) -> None:
     change, carbon, thaw = within_site_spread(sums)
     scale = float(f"{change / thaw:.2g}")
     print(f"\nwithin-site standard deviations: {len(sums)} policies, {args.sites} sites, {args.years} years")
-    print(f"at carbon_scale {paper:g}: change/scale {change / paper:.4f}, thaw {thaw:.4f}, ratio "
-          f"{change / paper / thaw:.4f}; carbon return with penalties {carbon:.3f}")  # fmt: skip
+    print(
+        f"at carbon_scale {paper:g}: change/scale {change / paper:.4f}, thaw {thaw:.4f}, ratio "
+        f"{change / paper / thaw:.4f}; carbon return with penalties {carbon:.3f}"
+    )
     print(f"balanced carbon_scale: {change / thaw:.4f}, to two digits {scale:g} kgC m-2 yr-1")
     carbon = within_site_spread(play(args, carbon_scale=scale))[1]
     print(f"at carbon_scale {scale:g}: carbon return with penalties and clipping {carbon:.3f}")

@@ -21,8 +21,13 @@ from analysis import protocol, results
 from analysis.studies import open_loop, stored
 
 YEARS = 50
-STAND = {"density_stems_ha": 1000.0, "conifer_fraction": 0.5, "biomass_kgc_m2": 5.0, "soil_kgc_m2": 6.0,
-         "oldest_age_years": 80.0}  # fmt: skip
+STAND = {
+    "density_stems_ha": 1000.0,
+    "conifer_fraction": 0.5,
+    "biomass_kgc_m2": 5.0,
+    "soil_kgc_m2": 6.0,
+    "oldest_age_years": 80.0,
+}
 SPARSE = {"density_stems_ha": 300.0, "biomass_kgc_m2": 1.5}
 PLANT_DECIDUOUS, PLANT_HALF, PLANT_CONIFER = 20, 22, 24
 ALL_ON = "all on"
@@ -47,10 +52,16 @@ PAIRS = {
         ({}, {"conifer_fraction": 0.8}, boreal_env.NO_CHANGE),
     ),
     "LAI, 20 % less to 20 % more": (
-        ({"max_lai_conifer": lambda lai: 0.8 * lai, "max_lai_deciduous": lambda lai: 0.8 * lai}, {},
-         boreal_env.NO_CHANGE),
-        ({"max_lai_conifer": lambda lai: 1.2 * lai, "max_lai_deciduous": lambda lai: 1.2 * lai}, {},
-         boreal_env.NO_CHANGE),
+        (
+            {"max_lai_conifer": lambda lai: 0.8 * lai, "max_lai_deciduous": lambda lai: 0.8 * lai},
+            {},
+            boreal_env.NO_CHANGE,
+        ),
+        (
+            {"max_lai_conifer": lambda lai: 1.2 * lai, "max_lai_deciduous": lambda lai: 1.2 * lai},
+            {},
+            boreal_env.NO_CHANGE,
+        ),
     ),
     "planting, none to 100 a year of 300 stems/ha": (
         ({}, SPARSE, boreal_env.NO_CHANGE),
@@ -80,10 +91,22 @@ PAIRS = {
         ({"wind_speed_m_s": lambda wind: 5.0}, SPARSE, boreal_env.NO_CHANGE),
         ({"wind_speed_m_s": lambda wind: 5.0}, SPARSE, PLANT_HALF),
     ),
-}  # fmt: skip
-MEANS = ("growing_season_days", "max_lai", "latent_heat_mj_m2", "transpiration_mm", "ground_shortwave_mj_m2",
-         "boundary_warming_mj_m2", "boundary_cooling_mj_m2", "active_layer_depth_m", "peak_swe_mm", "winter_albedo",
-         "gpp_kgc_m2", "autotrophic_respiration_kgc_m2", "net_carbon_change_kgc_m2")  # fmt: skip
+}
+MEANS = (
+    "growing_season_days",
+    "max_lai",
+    "latent_heat_mj_m2",
+    "transpiration_mm",
+    "ground_shortwave_mj_m2",
+    "boundary_warming_mj_m2",
+    "boundary_cooling_mj_m2",
+    "active_layer_depth_m",
+    "peak_swe_mm",
+    "winter_albedo",
+    "gpp_kgc_m2",
+    "autotrophic_respiration_kgc_m2",
+    "net_carbon_change_kgc_m2",
+)
 
 
 @dataclass
@@ -103,8 +126,13 @@ def play(change: dict, stand: dict, action: int, off: str, sites: int, years: in
     sampled = [sim.sample_site(open_loop.FIRST_SITE_SEED + k) for k in numbers]
     changed = [site | {name: function(site[name]) for name, function in change.items()} for site in sampled]
     plans = np.full((sites, years), action)
-    episodes = open_loop.play(changed, seeds, plans, initial={k: STAND | stand for k in numbers},
-                              mechanisms=None if off == ALL_ON else {off: False})  # fmt: skip
+    episodes = open_loop.play(
+        changed,
+        seeds,
+        plans,
+        initial={k: STAND | stand for k in numbers},
+        mechanisms=None if off == ALL_ON else {off: False},
+    )
     table = pd.DataFrame(episodes.returns(), columns=["carbon_return", "thaw_return"])
     table["thaw_clipped_years"] = episodes.clipped_years()[:, 1]
     return table.assign(**{name: episodes.total(name) / years for name in MEANS})
@@ -137,8 +165,14 @@ def main(args: Args) -> None:
     sites, years = (2, 1) if args.quick else (args.sites, YEARS)
     folder = results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR
     path = folder / "mechanism_pairs.csv"
-    settings = {"sites": sites, "years": years, "pairs": list(PAIRS), "off": OFF, "means": MEANS,
-                "physics": open_loop.fingerprint()}  # fmt: skip
+    settings = {
+        "sites": sites,
+        "years": years,
+        "pairs": list(PAIRS),
+        "off": OFF,
+        "means": MEANS,
+        "physics": open_loop.fingerprint(),
+    }
     if stored.is_finished(path, settings):
         print(f"{path} is finished")
         return

@@ -65,9 +65,12 @@ def search(objectives: Callable, blocks: int, budget: Budget, seed: int) -> np.n
     """
     first = first_genes(blocks, budget.population, np.random.default_rng(seed))
     algorithm = NSGA2(
-        pop_size=budget.population, sampling=first, crossover=TwoPointCrossover(), mutation=_DrawAnew(),
+        pop_size=budget.population,
+        sampling=first,
+        crossover=TwoPointCrossover(),
+        mutation=_DrawAnew(),
         repair=_OneGeneForNoChange(),
-    )  # fmt: skip
+    )
     result = minimize(_Plans(objectives, 2 * blocks), algorithm, ("n_gen", budget.generations), seed=seed)
     return np.atleast_2d(result.X)
 

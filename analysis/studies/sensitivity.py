@@ -43,10 +43,14 @@ ALTERNATIVES = {
     "light use 1.21 conifer, 1.68 deciduous": ({"light_use_conifer": 1.21, "light_use_deciduous": 1.68}, {}),
     "crowns of both species develop alike": ({}, {"crown_development": False}),
     "organic layer thin: .15 conifer, .05 deciduous": (
-        {"organic_depth_conifer_m": 0.15, "organic_depth_deciduous_m": 0.05}, {}),
+        {"organic_depth_conifer_m": 0.15, "organic_depth_deciduous_m": 0.05},
+        {},
+    ),
     "organic layer thick: .18 conifer, .10 deciduous": (
-        {"organic_depth_conifer_m": 0.18, "organic_depth_deciduous_m": 0.10}, {}),
-}  # fmt: skip
+        {"organic_depth_conifer_m": 0.18, "organic_depth_deciduous_m": 0.10},
+        {},
+    ),
+}
 
 #: Columns that the effects are measured on.
 MEASURES = {
@@ -119,8 +123,9 @@ def variants() -> list[Variant]:
     for name, constant in sim.CONSTANTS.items():
         for level, value in zip(("low", "high"), levels(name), strict=True):
             if value != constant.low:  # else it is at its limit already
-                found.append(Variant(name, level, f"{value:.4g}", f"constants {constant.group}",
-                                     constants={name: value}))  # fmt: skip
+                found.append(
+                    Variant(name, level, f"{value:.4g}", f"constants {constant.group}", constants={name: value})
+                )
     for label, (constants, mechanisms) in ALTERNATIVES.items():
         found.append(Variant(label, "high", "as named", "alternatives", constants=constants, mechanisms=mechanisms))
     return found
@@ -219,8 +224,9 @@ def page(table: pd.DataFrame) -> str:
     site = moved.factor.isin(sim.SITE_PARAMETERS)
     constant = moved.factor.isin(sim.CONSTANTS)
     returns, conflict = ("zero_carbon", "zero_thaw"), ("species_carbon", "species_thaw")
-    spans = ";\n".join(f"`{name}`: {SHARE * span:g}, a tenth of {what} ({span:g})"
-                       for name, (span, what) in SPANS.items())  # fmt: skip
+    spans = ";\n".join(
+        f"`{name}`: {SHARE * span:g}, a tenth of {what} ({span:g})" for name, (span, what) in SPANS.items()
+    )
     defaults = "\n".join(f"| `{name}` | {meaning} | {default[name]:+.2f} |" for name, meaning in MEASURES.items())
     return f"""# What the results hang on
 
@@ -293,8 +299,10 @@ def main(args: Args) -> None:
     if args.names:
         unknown = [name for name in args.names if name not in {variant.factor for variant in everything}]
         if unknown:
-            sys.exit(f"sensitivity.py: --names {unknown[0]}: a name in sim/constants.csv or sim/site_parameters.csv, "
-                     "or an alternative's, is allowed")  # fmt: skip
+            sys.exit(
+                f"sensitivity.py: --names {unknown[0]}: a name in sim/constants.csv or sim/site_parameters.csv, "
+                "or an alternative's, is allowed"
+            )
         chosen = [variant for variant in everything if variant.factor in ("default", *args.names)]
         progress = protocol.Progress("sensitivity", len(chosen), "variants")
         done = iter(range(1, len(chosen) + 1))
@@ -303,14 +311,20 @@ def main(args: Args) -> None:
         print(effects(table).to_string(float_format="%+.3f", index=False))
         return
 
-    settings = {"sites": site_seeds, "weathers": WEATHERS, "years": YEARS, "share": SHARE,
-                "physics": open_loop.fingerprint()}  # fmt: skip
+    settings = {
+        "sites": site_seeds,
+        "weathers": WEATHERS,
+        "years": YEARS,
+        "share": SHARE,
+        "physics": open_loop.fingerprint(),
+    }
     groups: dict[str, list[Variant]] = {}
     for variant in everything:
         groups.setdefault(variant.group, []).append(variant)
     paths = {group: args.output_dir / f"{group.replace(' ', '_')}.csv" for group in groups}
-    made_by = {group: settings | {"variants": [f"{v.factor} {v.level} {v.value}" for v in of]}
-               for group, of in groups.items()}  # fmt: skip
+    made_by = {
+        group: settings | {"variants": [f"{v.factor} {v.level} {v.value}" for v in of]} for group, of in groups.items()
+    }
     todo = [group for group in groups if not stored.is_finished(paths[group], made_by[group])]
     print(f"{len(groups) - len(todo)} of {len(groups)} groups are there, in {args.output_dir}", flush=True)
     progress = protocol.Progress("sensitivity", sum(len(groups[group]) for group in todo), "variants")

@@ -110,8 +110,10 @@ def branch(state: dict, rows, seeds) -> sim.Stands:
     """Stands that go on from rows of a `sim.Stands.get_state`, each with its own dice from here on."""
     stands = sim.Stands(len(rows))
     chosen = {name: state[name][rows] for name in ("parameters", "state", "record", "years")}
-    generators = {name: [np.random.default_rng(getattr(one, name)).bit_generator.state for one in seeds]
-                  for name in ("weather", "disturbance")}  # fmt: skip
+    generators = {
+        name: [np.random.default_rng(getattr(one, name)).bit_generator.state for one in seeds]
+        for name in ("weather", "disturbance")
+    }
     stands.set_state({**chosen, **generators, "seeds": seeds})
     return stands
 
@@ -164,8 +166,10 @@ def play_every_year(design: Design, years: int, state: dict, played) -> np.ndarr
     rewards = []
     for chunk in chunks(cases):
         sites = [design.seeds()[k] for k in chunk[:, 0]]
-        seeds = [open_loop.seeds(site, design.future(past, future))
-                 for site, (_, past, future, _) in zip(sites, chunk, strict=True)]  # fmt: skip
+        seeds = [
+            open_loop.seeds(site, design.future(past, future))
+            for site, (_, past, future, _) in zip(sites, chunk, strict=True)
+        ]
         orders = [fixed(list(ACTIONS.values())[action], years) for action in chunk[:, 3]]
         # the first reference's first past is row 0 of each site: in year 0 they do not differ
         rewards.append(advance(branch(state, chunk[:, 0] * design.pasts, seeds), np.array(orders)))
@@ -201,17 +205,19 @@ def by_site(first: np.ndarray, second: np.ndarray) -> pd.DataFrame:
     past_means = values.sum(axis=3) / np.maximum(each_past, 1)
     about_site = np.where(there, values - means[:, :, None, None], 0.0)
     about_past = np.where(there, values - past_means[..., None], 0.0)
-    return pd.DataFrame({
-        "pairs": pairs,
-        "effect": difference.sum(axis=(1, 2)) / np.maximum(pairs, 1),
-        "square": (difference**2).sum(axis=(1, 2)) / np.maximum(pairs, 1),
-        "first": means[0],
-        "second": means[1],
-        "site_squares": (about_site**2).sum(axis=(0, 2, 3)),
-        "site_freedom": 2 * np.maximum(pairs - 1, 0),
-        "past_squares": (about_past**2).sum(axis=(0, 2, 3)),
-        "past_freedom": 2 * np.maximum(each_past - 1, 0).sum(axis=1),
-    })[pairs > 0].reset_index(drop=True)  # fmt: skip
+    return pd.DataFrame(
+        {
+            "pairs": pairs,
+            "effect": difference.sum(axis=(1, 2)) / np.maximum(pairs, 1),
+            "square": (difference**2).sum(axis=(1, 2)) / np.maximum(pairs, 1),
+            "first": means[0],
+            "second": means[1],
+            "site_squares": (about_site**2).sum(axis=(0, 2, 3)),
+            "site_freedom": 2 * np.maximum(pairs - 1, 0),
+            "past_squares": (about_past**2).sum(axis=(0, 2, 3)),
+            "past_freedom": 2 * np.maximum(each_past - 1, 0).sum(axis=1),
+        }
+    )[pairs > 0].reset_index(drop=True)
 
 
 def estimates(sites: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -290,8 +296,14 @@ def table_of_years(curves: np.ndarray) -> pd.DataFrame:
     """Mean over the sites of the effect in each year after the action, with its interval; curves (sites, years)."""
     drawn = np.random.default_rng(0).integers(len(curves), size=(REPETITIONS, len(curves)))
     low, high = np.percentile(curves[drawn].mean(axis=1), [2.5, 97.5], axis=0)
-    return pd.DataFrame({"years_after": np.arange(curves.shape[1]), "effect": curves.mean(axis=0), "effect_low": low,
-                         "effect_high": high})  # fmt: skip
+    return pd.DataFrame(
+        {
+            "years_after": np.arange(curves.shape[1]),
+            "effect": curves.mean(axis=0),
+            "effect_low": low,
+            "effect_high": high,
+        }
+    )
 
 
 def analyse(cases) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -345,18 +357,24 @@ def study(design: Design, years: int) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def report(table: pd.DataFrame) -> None:
     """Print the effects, the noise and the episodes needed."""
-    print("\nEffect of an action on the rest of the episode, noise of the same sum, episodes to tell the two actions "
-          "apart\n(undiscounted; 95 % intervals over sites)")  # fmt: skip
-    print(f"{'reference':19s} {'contrast':24s} {'year':>5s} {'objective':13s} {'effect':>24s} {'noise':>6s} "
-          f"{'of site':>7s} {'of state':>8s} {'episodes':>10s} {'site base':>10s} {'state base':>10s} {'0-5':>5s} "
-          f"{'5-20':>5s} {'20-50':>5s}")  # fmt: skip
+    print(
+        "\nEffect of an action on the rest of the episode, noise of the same sum, episodes to tell the two actions "
+        "apart\n(undiscounted; 95 % intervals over sites)"
+    )
+    print(
+        f"{'reference':19s} {'contrast':24s} {'year':>5s} {'objective':13s} {'effect':>24s} {'noise':>6s} "
+        f"{'of site':>7s} {'of state':>8s} {'episodes':>10s} {'site base':>10s} {'state base':>10s} {'0-5':>5s} "
+        f"{'5-20':>5s} {'20-50':>5s}"
+    )
     for row in table[(table.weighting == "return") & table.effect.notna()].itertuples():
         shares = [] if pd.isna(row.years_0_5) else [row.years_0_5, row.years_5_20, row.years_20_50]
         interval = f"{row.effect:+.4f} [{row.effect_low:+.3f}, {row.effect_high:+.3f}]"
         needed = (row.episodes, row.site_episodes, row.state_episodes)
-        print(f"{row.reference:19s} {row.contrast:24s} {row.year:>5s} {row.objective:13s} {interval:>24s} "
-              f"{row.noise:6.2f} {row.site_noise:7.2f} {row.state_noise:8.2f} "
-              f"{' '.join(f'{n:10,.0f}' for n in needed)} {' '.join(f'{share:5.0%}' for share in shares)}")  # fmt: skip
+        print(
+            f"{row.reference:19s} {row.contrast:24s} {row.year:>5s} {row.objective:13s} {interval:>24s} "
+            f"{row.noise:6.2f} {row.site_noise:7.2f} {row.state_noise:8.2f} "
+            f"{' '.join(f'{n:10,.0f}' for n in needed)} {' '.join(f'{share:5.0%}' for share in shares)}"
+        )
 
 
 def main(args: Args) -> None:
@@ -364,8 +382,14 @@ def main(args: Args) -> None:
     design, years = (QUICK, 12) if args.quick else (FULL, YEARS)
     folder = results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR
     paths = [folder / f"signal_to_noise{end}.csv" for end in ("_years", "")]
-    settings = {**design._asdict(), "episode_years": years, "actions": ACTIONS, "contrasts": CONTRASTS,
-                "weightings": WEIGHTINGS, "physics": open_loop.fingerprint()}  # fmt: skip
+    settings = {
+        **design._asdict(),
+        "episode_years": years,
+        "actions": ACTIONS,
+        "contrasts": CONTRASTS,
+        "weightings": WEIGHTINGS,
+        "physics": open_loop.fingerprint(),
+    }
     if all(stored.is_finished(path, settings) for path in paths):
         print(f"{paths[-1]} is finished")
         report(stored.read(paths[-1], text=("year",)))

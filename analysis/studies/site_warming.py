@@ -46,15 +46,19 @@ def study(curricula: list[results.Replicate], each: int, years: int) -> pd.DataF
         sites = [sim.sample_site(int(seed)) for seed in drawn.site_seed]
         seeds = [open_loop.seeds(int(seed), k) for k, seed in enumerate(drawn.site_seed)]
         episodes = open_loop.play(sites, seeds, np.full((len(drawn), years), boreal_env.NO_CHANGE))
-        tables.append(pd.DataFrame({
-            "seed": run.arguments["seed"],
-            "site_seed": drawn.site_seed,
-            "selected": drawn.selected,
-            "latitude_deg": [site["latitude_deg"] for site in sites],
-            "warming_mj_m2": episodes.total("boundary_warming_mj_m2") / years,
-            "cooling_mj_m2": episodes.total("boundary_cooling_mj_m2") / years,
-            "thaw_return": episodes.returns()[:, 1],
-        }))  # fmt: skip
+        tables.append(
+            pd.DataFrame(
+                {
+                    "seed": run.arguments["seed"],
+                    "site_seed": drawn.site_seed,
+                    "selected": drawn.selected,
+                    "latitude_deg": [site["latitude_deg"] for site in sites],
+                    "warming_mj_m2": episodes.total("boundary_warming_mj_m2") / years,
+                    "cooling_mj_m2": episodes.total("boundary_cooling_mj_m2") / years,
+                    "thaw_return": episodes.returns()[:, 1],
+                }
+            )
+        )
         progress.show(number + 1)
     return pd.concat(tables, ignore_index=True)
 

@@ -54,11 +54,18 @@ def play(num_envs: int, seed: int, steps: int, every: int = EVERY) -> pd.DataFra
                 envs.reset()  # the next episode of each stream, as at an episode's end
                 continue
             returns = sum(envs.step(nothing)[1].astype(float) for _ in range(years))
-            tables.append(pd.DataFrame({
-                "num_envs": num_envs, "seed": seed, "env": np.arange(num_envs),
-                "global_step": number * years * num_envs,
-                "carbon_return": returns[:, 0], "thaw_return": returns[:, 1],
-            }))  # fmt: skip
+            tables.append(
+                pd.DataFrame(
+                    {
+                        "num_envs": num_envs,
+                        "seed": seed,
+                        "env": np.arange(num_envs),
+                        "global_step": number * years * num_envs,
+                        "carbon_return": returns[:, 0],
+                        "thaw_return": returns[:, 1],
+                    }
+                )
+            )
             progress.show(number, number == rounds)
     return pd.concat(tables, ignore_index=True)
 
@@ -73,10 +80,14 @@ def gains(run, nothing: pd.DataFrame) -> pd.DataFrame | None:
     if both.empty:
         return None
     carbon, thaw = (both[f"{name}_return"] - both[f"{name}_return_nothing"] for name in ("carbon", "thaw"))
-    return pd.DataFrame({
-        "global_step": both.global_step, "carbon_gain": carbon, "thaw_gain": thaw,
-        "scalarized_gain": protocol.scalarize(carbon, thaw, both.preference),
-    })  # fmt: skip
+    return pd.DataFrame(
+        {
+            "global_step": both.global_step,
+            "carbon_gain": carbon,
+            "thaw_gain": thaw,
+            "scalarized_gain": protocol.scalarize(carbon, thaw, both.preference),
+        }
+    )
 
 
 def main(args: Args) -> None:

@@ -91,8 +91,11 @@ def variance_components(values: np.ndarray, factors: tuple[str, ...] = FACTORS) 
     components = {}
     for term in reversed(terms[1:]):
         repeats = np.prod([values.shape[axis] for axis in range(values.ndim) if axis not in term])
-        larger = {t: np.prod([values.shape[axis] for axis in range(values.ndim) if axis not in t])
-                  for t in components if set(term) < set(t)}  # fmt: skip
+        larger = {
+            t: np.prod([values.shape[axis] for axis in range(values.ndim) if axis not in t])
+            for t in components
+            if set(term) < set(t)
+        }
         components[term] = (squares[term] - sum(n * components[t] for t, n in larger.items())) / repeats
     return pd.Series({" x ".join(factors[axis] for axis in term): components[term] for term in terms[1:]})
 
@@ -109,8 +112,10 @@ def split(values: np.ndarray) -> pd.DataFrame:
     """
     components = variance_components(values)
     generator = np.random.default_rng(0)
-    resampled = [shares(variance_components(values[generator.integers(len(values), size=len(values))]))
-                 for _ in range(REPETITIONS)]  # fmt: skip
+    resampled = [
+        shares(variance_components(values[generator.integers(len(values), size=len(values))]))
+        for _ in range(REPETITIONS)
+    ]
     low, high = np.percentile(resampled, [2.5, 97.5], axis=0)
     table = pd.DataFrame({"variance": components, "share": shares(components), "share_low": low, "share_high": high})
     return table.rename_axis("component").reset_index()
@@ -161,8 +166,10 @@ def main(args: Args) -> None:
 
     components, explained = [], []
     for k, name in enumerate(open_loop.OBJECTIVES):
-        components += [split(returns[..., k]).assign(value="return", objective=name),
-                       split_years(rewards[..., k]).assign(value="one year", objective=name)]  # fmt: skip
+        components += [
+            split(returns[..., k]).assign(value="return", objective=name),
+            split_years(rewards[..., k]).assign(value="one year", objective=name),
+        ]
         explained.append({"objective": name, **site_effect(returns[..., k].mean(axis=(1, 2)), features)})
     components, explained = pd.concat(components, ignore_index=True), pd.DataFrame(explained)
     columns = [f"{name}_{what}" for what in ("return", "gain") for name in open_loop.OBJECTIVES]
@@ -186,8 +193,10 @@ def report(components: pd.DataFrame, explained: pd.DataFrame, policies: pd.DataF
     whole = components[components.value == "return"].set_index(["objective", "component"])
     for name in open_loop.OBJECTIVES:
         of = whole.loc[name]
-        print(f"{name} return: standard deviation {of.variance.sum() ** 0.5:.2f}; site {of.share['site']:.1%} "
-              f"({of.share_low['site']:.1%} to {of.share_high['site']:.1%} over resampled sites)")  # fmt: skip
+        print(
+            f"{name} return: standard deviation {of.variance.sum() ** 0.5:.2f}; site {of.share['site']:.1%} "
+            f"({of.share_low['site']:.1%} to {of.share_high['site']:.1%} over resampled sites)"
+        )
     print("\nof the variance between sites, explained by\n" + explained.to_string(index=False, float_format="%.2f"))
     print("\n" + policies.to_string(index=False, float_format="%+.2f"))
 

@@ -70,9 +70,17 @@ def write_table(stem: Path, table: pd.DataFrame, text: pd.DataFrame) -> None:
     markdown = "".join("| " + " | ".join(line) + " |\n" for line in lines)
     with protocol.replacing(stem.with_suffix(".md")) as file:
         file.write(markdown.encode())
-    head, *body = [" & ".join(line).replace("_", r"\_").replace("%", r"\%") + r" \\"
-                   for line in (text.columns, *text.to_numpy())]  # fmt: skip
-    latex = [rf"\begin{{tabular}}{{{'l' * text.shape[1]}}}", r"\toprule", head, r"\midrule", *body,
-             r"\bottomrule", r"\end{tabular}"]  # fmt: skip
+    head, *body = [
+        " & ".join(line).replace("_", r"\_").replace("%", r"\%") + r" \\" for line in (text.columns, *text.to_numpy())
+    ]
+    latex = [
+        rf"\begin{{tabular}}{{{'l' * text.shape[1]}}}",
+        r"\toprule",
+        head,
+        r"\midrule",
+        *body,
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
     with protocol.replacing(stem.with_suffix(".tex")) as file:
         file.write(("\n".join(latex) + "\n").encode())

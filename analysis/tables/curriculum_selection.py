@@ -7,8 +7,7 @@ from analysis.tables.common import over_seeds, paper
 
 TITLE = "Curriculum selection"
 CATEGORIES = {"accepted": 1, "rejected": 0}
-NUMBERS = {"latitude_deg": "latitude", "warming_mj_m2": "warming", "cooling_mj_m2": "cooling",
-           "thaw_return": "thaw"}  # fmt: skip
+NUMBERS = {"latitude_deg": "latitude", "warming_mj_m2": "warming", "cooling_mj_m2": "cooling", "thaw_return": "thaw"}
 COLUMNS = {
     "category": "sites",
     "seeds": "seeds",
@@ -37,8 +36,10 @@ def make(results) -> pd.DataFrame:
             chosen = sites[sites.selected == selected]
             means[category] = chosen.groupby("seed")[list(NUMBERS)].mean().rename(columns=NUMBERS)
             row |= over_seeds(means[category])
-        row |= {"paper_latitude": published.latitude[category],
-                "paper_warming": published.potential_warming_flux_mj[category]}  # fmt: skip
+        row |= {
+            "paper_latitude": published.latitude[category],
+            "paper_warming": published.potential_warming_flux_mj[category],
+        }
         rows.append(row)
     difference = {"category": "accepted less rejected", "seeds": len(curricula), "share_percent": np.nan}
     if sites is not None:

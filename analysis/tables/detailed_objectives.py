@@ -26,7 +26,8 @@ def by_weight(one) -> pd.DataFrame:
     """Means of one run, a row per weight."""
     spread = one.evaluation.groupby("preference")[metrics.OBJECTIVES].std()
     table = metrics.mean_returns(one.evaluation).join(
-        spread.rename(columns=lambda name: name.replace("return", "sd_over_episodes")))  # fmt: skip
+        spread.rename(columns=lambda name: name.replace("return", "sd_over_episodes"))
+    )
     if one.gains is not None:
         gains = metrics.mean_returns(one.gains)
         table = table.join(gains.rename(columns=lambda name: name.replace("return", "gain")))

@@ -26,7 +26,8 @@ def shares(rows: pd.DataFrame) -> dict:
     sums = rows.groupby("weight")[["scalarized_gain", "best_scalarized_gain"]].sum()
     ratio = 100 * sums.scalarized_gain / sums.best_scalarized_gain
     return {f"share_{weight:g}": value for weight, value in ratio.items()} | {
-        "hypervolume": 100 * rows.groupby("site").hypervolume_share.first().mean()}  # fmt: skip
+        "hypervolume": 100 * rows.groupby("site").hypervolume_share.first().mean()
+    }
 
 
 def make(results) -> pd.DataFrame:
@@ -48,5 +49,6 @@ def make(results) -> pd.DataFrame:
             found = pd.DataFrame([shares(its) for _, its in one.groupby(replicates, sort=True)])
             row = dict(zip(ROW, key, strict=True)) | {"seeds": len(found), "sites": f"{one.site.nunique()}, {sites}"}
             rows.append(row | over_seeds(found))
-    return pd.DataFrame(rows).reindex(columns=[*columns, *(f"{name}{end}" for name in columns[6:]
-                                                            for end in ("_low", "_high"))])  # fmt: skip
+    return pd.DataFrame(rows).reindex(
+        columns=[*columns, *(f"{name}{end}" for name in columns[6:] for end in ("_low", "_high"))]
+    )

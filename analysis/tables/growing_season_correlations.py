@@ -16,10 +16,15 @@ from analysis.studies.mechanism_pairs import effects
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Growing-season correlations"
-VARIABLES = {"thaw_return": "thaw_reward", "latent_heat_mj_m2": "latent_heat",
-             "ground_shortwave_mj_m2": "ground_radiation"}  # fmt: skip
-SEASON_PAIRS = {"leaves": "growing season of leaves, 40 days longer",
-                "climate": "growing season by a climate 1 K warmer"}  # fmt: skip
+VARIABLES = {
+    "thaw_return": "thaw_reward",
+    "latent_heat_mj_m2": "latent_heat",
+    "ground_shortwave_mj_m2": "ground_radiation",
+}
+SEASON_PAIRS = {
+    "leaves": "growing season of leaves, 40 days longer",
+    "climate": "growing season by a climate 1 K warmer",
+}
 COLUMNS = ROW_COLUMNS | {
     "variable": "variable",
     "r": "r",
@@ -52,8 +57,11 @@ def pair_effects(pairs: pd.DataFrame | None, variable: str) -> dict:
     row = {}
     for name, pair in SEASON_PAIRS.items() if pairs is not None else ():
         mean, half_width = metrics.mean_interval(effects(pairs, pair, variable))
-        row |= {f"{name}_effect": mean, f"{name}_effect_low": mean - half_width,
-                f"{name}_effect_high": mean + half_width}  # fmt: skip
+        row |= {
+            f"{name}_effect": mean,
+            f"{name}_effect_low": mean - half_width,
+            f"{name}_effect_high": mean + half_width,
+        }
     return row
 
 

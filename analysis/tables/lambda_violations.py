@@ -27,9 +27,12 @@ def violations(one) -> dict:
     front = metrics.mean_returns(one.evaluation).to_numpy()
     if len(front) < 2 or not np.ptp(front, axis=0).any():
         return {}
-    row = {"pairs": len(front) - 1, "violations_percent": metrics.violations_percent(front),
-           "violations_or_ties_percent": metrics.violations_or_ties_percent(front),
-           "noise_violations_percent": metrics.expected_violations_percent(front)}  # fmt: skip
+    row = {
+        "pairs": len(front) - 1,
+        "violations_percent": metrics.violations_percent(front),
+        "violations_or_ties_percent": metrics.violations_or_ties_percent(front),
+        "noise_violations_percent": metrics.expected_violations_percent(front),
+    }
     return row | {"significant_violations_percent": metrics.significant_violations_percent(one.evaluation)}
 
 
@@ -38,8 +41,18 @@ def make(results) -> pd.DataFrame:
     published = paper("monotonicity_violations", index_col="method").violations_percent
     details = paper("detailed_objectives").groupby("method")[["carbon_mean", "thaw_mean"]]
     details = details.apply(metrics.violations_percent)
-    names = [name for name in COLUMNS if name in ("pairs", "violations_percent", "violations_or_ties_percent",
-                                                  "significant_violations_percent", "noise_violations_percent")]
+    names = [
+        name
+        for name in COLUMNS
+        if name
+        in (
+            "pairs",
+            "violations_percent",
+            "violations_or_ties_percent",
+            "significant_violations_percent",
+            "noise_violations_percent",
+        )
+    ]
     rows = []
     for key, replicates in results.rows.items():
         if not results.is_trained(key):

@@ -7,9 +7,15 @@ from analysis.results import METHODS as PAPER_NAMES
 from analysis.tables.common import ROW_COLUMNS, mean_of_years, over_seeds, paper, row_of
 
 TITLE = "Learned strategies"
-YEARS = {"density_stems_ha": "density", "conifer_fraction": "conifer_fraction", "planted_stems_ha": "planted",
-         "thinned_stems_ha": "thinned", "max_lai": "max_lai", "winter_albedo": "winter_albedo",
-         "boundary_warming_mj_m2": "warming"}  # fmt: skip
+YEARS = {
+    "density_stems_ha": "density",
+    "conifer_fraction": "conifer_fraction",
+    "planted_stems_ha": "planted",
+    "thinned_stems_ha": "thinned",
+    "max_lai": "max_lai",
+    "winter_albedo": "winter_albedo",
+    "boundary_warming_mj_m2": "warming",
+}
 COLUMNS = ROW_COLUMNS | {
     "density": "density (stems/ha)",
     "final_density": "density, last year",

@@ -92,8 +92,10 @@ def make(results) -> pd.DataFrame:
             rows.append({"of": contrast, "quantity": quantity, **of_objectives(there, column, factor)})
         uniform = table[(table.reference == UNIFORM) & (table.contrast == contrast)]
         for quantity, (weighting, noise) in SHARED.items():
-            years = {objective: uniform[(uniform.weighting == weighting) & (uniform.objective == objective)]
-                     for objective in OBJECTIVES}  # fmt: skip
+            years = {
+                objective: uniform[(uniform.weighting == weighting) & (uniform.objective == objective)]
+                for objective in OBJECTIVES
+            }
             needed = {objective: shared_episodes(case, noise) for objective, case in years.items()}
             rows.append({"of": contrast, "quantity": quantity, **needed})
     gradients = results.study("gradient_noise")

@@ -33,8 +33,17 @@ COLUMNS = ROW_COLUMNS | {
     "carbon_slope": "slope of carbon",
     "thaw_slope": "slope of thaw",
 }
-TERMINAL = ("method", "environment", "setting", "seeds", "scalarised", "scalarised (paper)", "hypervolume",
-            "hypervolume (paper)", "gain hypervolume")  # fmt: skip
+TERMINAL = (
+    "method",
+    "environment",
+    "setting",
+    "seeds",
+    "scalarised",
+    "scalarised (paper)",
+    "hypervolume",
+    "hypervolume (paper)",
+    "gain hypervolume",
+)
 
 
 def front_metrics(evaluation: pd.DataFrame, prefix: str = "") -> dict:
@@ -63,23 +72,37 @@ def run_metrics(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
     return row if gains is None else row | front_metrics(gains, "gain_")
 
 
-NUMBERS = ("scalarized", "hypervolume", "sparsity", "expected_utility", "cardinality", "gain_scalarized",
-           "gain_hypervolume", "gain_sparsity", "carbon_change", "thaw_change", "carbon_slope", "thaw_slope",
-           "sd_over_episodes")  # fmt: skip
+NUMBERS = (
+    "scalarized",
+    "hypervolume",
+    "sparsity",
+    "expected_utility",
+    "cardinality",
+    "gain_scalarized",
+    "gain_hypervolume",
+    "gain_sparsity",
+    "carbon_change",
+    "thaw_change",
+    "carbon_slope",
+    "thaw_slope",
+    "sd_over_episodes",
+)
 
 
 def paper_rows() -> pd.DataFrame:
     """The paper's main table, and what its own table of details gives for the same."""
     table = paper("main_results", index_col="method")
     fronts = paper("detailed_objectives").groupby("method")[["carbon_mean", "thaw_mean"]]
-    return pd.DataFrame({
-        "paper_scalarized": table.scalarized_mean,
-        "paper_sd_over_episodes": table.scalarized_std,
-        "paper_hypervolume": table.hypervolume,
-        "paper_sparsity": table.sparsity,
-        "paper_detail_hypervolume": fronts.apply(metrics.hypervolume),
-        "paper_detail_sparsity": fronts.apply(metrics.sparsity),
-    })  # fmt: skip
+    return pd.DataFrame(
+        {
+            "paper_scalarized": table.scalarized_mean,
+            "paper_sd_over_episodes": table.scalarized_std,
+            "paper_hypervolume": table.hypervolume,
+            "paper_sparsity": table.sparsity,
+            "paper_detail_hypervolume": fronts.apply(metrics.hypervolume),
+            "paper_detail_sparsity": fronts.apply(metrics.sparsity),
+        }
+    )
 
 
 def constant_plans(results) -> dict[tuple, list]:
@@ -98,8 +121,11 @@ def constant_plans(results) -> dict[tuple, list]:
 
 def make(results) -> pd.DataFrame:
     """One row per script, environment and setting, those trained on the asymmetric reward in generalist mode."""
-    evaluations = {key: [(one.evaluation, one.gains) for one in replicates] for key, replicates in results.rows.items()
-                   if key[1] in ENVIRONMENTS and "thaw_formulation" not in key[2]}  # fmt: skip
+    evaluations = {
+        key: [(one.evaluation, one.gains) for one in replicates]
+        for key, replicates in results.rows.items()
+        if key[1] in ENVIRONMENTS and "thaw_formulation" not in key[2]
+    }
     evaluations |= constant_plans(results)
     published, rows = paper_rows(), []
     for key in sorted(evaluations, key=lambda key: ENVIRONMENTS.index(key[1])):

@@ -11,11 +11,22 @@ from analysis.studies.mechanism_pairs import ALL_ON, PAIRS, effects
 from analysis.tables.common import paper
 
 TITLE = "Physical conflicts"
-EFFECTS = ("carbon_return", "thaw_return", "net_carbon_change_kgc_m2", "boundary_warming_mj_m2",
-           "ground_shortwave_mj_m2", "latent_heat_mj_m2", "active_layer_depth_m", "peak_swe_mm",
-           "winter_albedo")  # fmt: skip
-WITHOUT = {"thaw_without_interception": ("thaw_return", "interception"), "thaw_without_moss": ("thaw_return", "moss"),
-           "carbon_without_fire": ("carbon_return", "fire")}  # fmt: skip
+EFFECTS = (
+    "carbon_return",
+    "thaw_return",
+    "net_carbon_change_kgc_m2",
+    "boundary_warming_mj_m2",
+    "ground_shortwave_mj_m2",
+    "latent_heat_mj_m2",
+    "active_layer_depth_m",
+    "peak_swe_mm",
+    "winter_albedo",
+)
+WITHOUT = {
+    "thaw_without_interception": ("thaw_return", "interception"),
+    "thaw_without_moss": ("thaw_return", "moss"),
+    "carbon_without_fire": ("carbon_return", "fire"),
+}
 COLUMNS = {
     "change": "change",
     "sites": "sites",
@@ -61,8 +72,11 @@ def make(results) -> pd.DataFrame:
             for name, (mean, half_width) in means.items():
                 row |= {name: mean, f"{name}_low": mean - half_width, f"{name}_high": mean + half_width}
             opposed = np.sign(apart["carbon_return"]) * np.sign(apart["thaw_return"]) < 0
-            row |= {"sites": len(sites), "clipped_sites": clipped.sum(),
-                    "conflict": verdict(means["carbon_return"], means["thaw_return"]),
-                    "share_of_sites_in_conflict": 100 * opposed.mean()}  # fmt: skip
+            row |= {
+                "sites": len(sites),
+                "clipped_sites": clipped.sum(),
+                "conflict": verdict(means["carbon_return"], means["thaw_return"]),
+                "share_of_sites_in_conflict": 100 * opposed.mean(),
+            }
         rows.append(row)
     return pd.DataFrame(rows)

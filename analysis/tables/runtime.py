@@ -23,8 +23,11 @@ def hours(run) -> dict:
     """Hours of a run by phase; `training` is rollouts and updates."""
     by_phase = run.timing.groupby("phase").seconds.sum().reindex([*PHASES, "environment"]) / 3600
     training = by_phase["rollout"] + by_phase["update"]
-    return {"training": training, "evaluation": by_phase["evaluation"],
-            "environment": 100 * by_phase["environment"] / training}  # fmt: skip
+    return {
+        "training": training,
+        "evaluation": by_phase["evaluation"],
+        "environment": 100 * by_phase["environment"] / training,
+    }
 
 
 def published(name: str) -> str:
@@ -42,19 +45,44 @@ def make(results) -> pd.DataFrame:
         columns = ["training", "evaluation", "environment"]
         table = pd.DataFrame([hours(run) for run in runs], columns=columns).astype(float)
         quoted.add(name)
-        for column, unit, theirs in (("training", "h", published(name)), ("evaluation", "h", ""),
-                                     ("environment", "% of training", "")):  # fmt: skip
+        for column, unit, theirs in (
+            ("training", "h", published(name)),
+            ("evaluation", "h", ""),
+            ("environment", "% of training", ""),
+        ):
             row = over_seeds(table[[column]].set_axis(["ours"], axis=1))
-            rows.append({"quantity": f"{what}: {column}", "unit": unit, "seeds": len(table), "paper": theirs,
-                         "source": "timing.csv", **row})  # fmt: skip
+            rows.append(
+                {
+                    "quantity": f"{what}: {column}",
+                    "unit": unit,
+                    "seeds": len(table),
+                    "paper": theirs,
+                    "source": "timing.csv",
+                    **row,
+                }
+            )
     if BENCHMARK.exists():
         for row in pd.read_csv(BENCHMARK).itertuples():
-            rows.append({"quantity": row.what, "unit": row.unit, "ours": row.median, "ours_low": row.low,
-                         "ours_high": row.high, "paper": "" if pd.isna(row.paper) else row.paper,
-                         "source": "benchmark.py (lowest, highest)"})  # fmt: skip
+            rows.append(
+                {
+                    "quantity": row.what,
+                    "unit": row.unit,
+                    "ours": row.median,
+                    "ours_low": row.low,
+                    "ours_high": row.high,
+                    "paper": "" if pd.isna(row.paper) else row.paper,
+                    "source": "benchmark.py (lowest, highest)",
+                }
+            )
     for name in paper("runtime").quantity:
         if name not in quoted:
             ours = 365 * 48 if name == "physics_steps_per_year" else np.nan
-            rows.append({"quantity": name, "ours": ours, "paper": published(name),
-                         "source": "365 days of 48" if ours == ours else "analysis/benchmark.py, profile_kernel.py"})
+            rows.append(
+                {
+                    "quantity": name,
+                    "ours": ours,
+                    "paper": published(name),
+                    "source": "365 days of 48" if ours == ours else "analysis/benchmark.py, profile_kernel.py",
+                }
+            )
     return pd.DataFrame(rows)

@@ -38,8 +38,10 @@ def make(results) -> pd.DataFrame:
         for variant, flags in VARIANTS.items():
             columns[f"{name}_{variant}"] = own_gains(results.of("site", "eupg_fixed_lambda", **flags), weight)
         columns[f"{name}_plan"] = constant_plans.best_gains(plans, f"{name}_return") if plans is not None else np.nan
-    table = pd.DataFrame(columns, index=sorted(set().union(*(column.index for column in columns.values()
-                                                             if isinstance(column, pd.Series)))))  # fmt: skip
+    table = pd.DataFrame(
+        columns,
+        index=sorted(set().union(*(column.index for column in columns.values() if isinstance(column, pd.Series)))),
+    )
     table = table[[name for name in COLUMNS if name in table]]
     mean = table.mean().to_frame("mean").T
     return pd.concat([table, mean]).rename_axis("site_seed").reset_index().astype({"site_seed": str})

@@ -37,8 +37,11 @@ SPREADS = ["scalarized_sd", "carbon_sd", "thaw_sd"]
 def replicates_of(results, formulation: str) -> list:
     """Runs of gated PPO trained on a formulation."""
     flags = {} if formulation == "asymmetric" else {"thaw_formulation": formulation}
-    if not any(job.flags.get("thaw_formulation", "asymmetric") == formulation for job in results.jobs
-               if job.script == "ppo_gated"):  # fmt: skip
+    if not any(
+        job.flags.get("thaw_formulation", "asymmetric") == formulation
+        for job in results.jobs
+        if job.script == "ppo_gated"
+    ):
         return []  # `reproduce.py --quick` trains on one formulation alone
     return results.of(FORMULATIONS[formulation], "ppo_gated", **flags)
 
@@ -47,10 +50,12 @@ def run_numbers(one) -> dict:
     """Numbers of one run; those under the asymmetric reward if the evaluation has it."""
     evaluation = one.evaluation
     row = front_metrics(evaluation) | {
-        "carbon": evaluation.carbon_return.mean(), "carbon_sd": evaluation.carbon_return.std(),
-        "thaw": evaluation.thaw_return.mean(), "thaw_sd": evaluation.thaw_return.std(),
+        "carbon": evaluation.carbon_return.mean(),
+        "carbon_sd": evaluation.carbon_return.std(),
+        "thaw": evaluation.thaw_return.mean(),
+        "thaw_sd": evaluation.thaw_return.std(),
         "scalarized_sd": evaluation.scalarized_return.std(),
-    }  # fmt: skip
+    }
     if one.gains is not None:
         row["gain_scalarized"] = metrics.mean_scalarized(one.gains)
     if one.runs[0].arguments["thaw_formulation"] == "asymmetric":

@@ -24,8 +24,9 @@ def make(results) -> pd.DataFrame:
     reference = [mean_of_years(one, list(FLUXES))["boundary_warming_mj_m2"] for one in zero_change]
     rows = []
     for formulation in FORMULATIONS:
-        table = pd.DataFrame([mean_of_years(one, list(FLUXES)) for one in replicates_of(results, formulation)],
-                             columns=list(FLUXES)).rename(columns=FLUXES)  # fmt: skip
+        table = pd.DataFrame(
+            [mean_of_years(one, list(FLUXES)) for one in replicates_of(results, formulation)], columns=list(FLUXES)
+        ).rename(columns=FLUXES)
         row = {"formulation": formulation, "seeds": len(table)} | over_seeds(table)
         row |= {"paper_warming": published[formulation], "zero_change_warming": reference[0] if reference else None}
         rows.append(row)

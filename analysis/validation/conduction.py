@@ -65,12 +65,16 @@ class Ground(NamedTuple):
         """The ground of a site, from all its parameters by name."""
         thawed = parameters["soil_conductivity"]
         return cls(
-            thawed, thawed * parameters["soil_frozen_conductivity_ratio"],
-            parameters["soil_heat_capacity_thawed"], parameters["soil_heat_capacity_frozen"],
-            LATENT_HEAT_FUSION * WATER_DENSITY * parameters["soil_freezing_water"], parameters["soil_freezing_range_k"],
+            thawed,
+            thawed * parameters["soil_frozen_conductivity_ratio"],
+            parameters["soil_heat_capacity_thawed"],
+            parameters["soil_heat_capacity_frozen"],
+            LATENT_HEAT_FUSION * WATER_DENSITY * parameters["soil_freezing_water"],
+            parameters["soil_freezing_range_k"],
             parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K,
-            parameters["organic_conductivity_thawed"], parameters["organic_conductivity_frozen"],
-        )  # fmt: skip
+            parameters["organic_conductivity_thawed"],
+            parameters["organic_conductivity_frozen"],
+        )
 
 
 class Surface(NamedTuple):
@@ -85,7 +89,7 @@ class Surface(NamedTuple):
 @phase
 def conduct(
     surface, ground, closures, organic_layers, organic_heat, thickness, freezing, above, below, heat, daily, flux
-):  # fmt: skip
+):
     """Conduct heat down a column, interval after interval, by explicit steps short enough to be stable.
 
     thickness, freezing : of each layer, and of its part that can freeze [m]; above, below : from its node to its upper
@@ -171,9 +175,19 @@ class Column:
         surface, into the boundary and out of it [MJ m-2], (3,)."""
         daily, flux = np.zeros((len(surface.organic), len(self.heat))), np.zeros(3)
         conduct(
-            surface, self.ground, self.grid.closures, self.grid.organic_layers, self.organic_heat,
-            self.thickness, self.freezing, self.above, self.below, self.heat, daily, flux,
-        )  # fmt: skip
+            surface,
+            self.ground,
+            self.grid.closures,
+            self.grid.organic_layers,
+            self.organic_heat,
+            self.thickness,
+            self.freezing,
+            self.above,
+            self.below,
+            self.heat,
+            daily,
+            flux,
+        )
         return daily[:, self.grid.organic_layers :], flux
 
 

@@ -72,9 +72,13 @@ class Fires:
         fewest, most = poisson_interval(fires)
         nothing = float("nan")
         return cls(
-            fires, years / fires if fires else float("inf"), years / most, years / fewest if fewest else float("inf"),
-            float(killed[struck].mean()) if fires else nothing, float(burned[struck].mean()) if fires else nothing,
-        )  # fmt: skip
+            fires,
+            years / fires if fires else float("inf"),
+            years / most,
+            years / fewest if fewest else float("inf"),
+            float(killed[struck].mean()) if fires else nothing,
+            float(burned[struck].mean()) if fires else nothing,
+        )
 
 
 def mortality(run: Run) -> np.ndarray:
@@ -121,8 +125,10 @@ of 1500-2000 stems/ha fits large trees only.
 
 def fire_days(run: Run, parameters: list[dict[str, float]]) -> tuple[np.ndarray, np.ndarray]:
     """Days of each site, (sites,), on which summer is warm enough for fire, and on which it is dry enough as well."""
-    columns = [np.array([site[name] for site in parameters]) for name in
-               ("summer_start_day", "summer_end_day", "fire_drought_threshold")]  # fmt: skip
+    columns = [
+        np.array([site[name] for site in parameters])
+        for name in ("summer_start_day", "summer_end_day", "fire_drought_threshold")
+    ]
     start, end, threshold = columns
     drying, warmth = CONSTANTS["drought_evaporation"].low, CONSTANTS["fire_temperature_c"].low
     warm, ready, index = np.zeros(len(start)), np.zeros(len(start)), np.zeros(len(start))

@@ -14,8 +14,15 @@ BLACK, GREY = "#222222", "#9a9a9a"
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9"
 DPI, COLOURS = 100, 128
 WIDTH = 120
-STYLE = {"font.size": 9, "axes.titlesize": 9, "axes.titlelocation": "left", "legend.fontsize": 8,
-         "legend.frameon": False, "axes.spines.top": False, "axes.spines.right": False}  # fmt: skip
+STYLE = {
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.titlelocation": "left",
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+}
 
 
 @dataclass(frozen=True)

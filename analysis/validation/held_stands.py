@@ -49,9 +49,14 @@ class Run:
 
 
 def hold(
-    kind: dict, sites: int, years: int, skipped: int = 0, mechanisms: dict | None = None,
-    site_overrides: dict | None = None, keep_daily: tuple[str, ...] = (),
-) -> Run:  # fmt: skip
+    kind: dict,
+    sites: int,
+    years: int,
+    skipped: int = 0,
+    mechanisms: dict | None = None,
+    site_overrides: dict | None = None,
+    keep_daily: tuple[str, ...] = (),
+) -> Run:
     """Run a kind of stand on sampled sites 0 to `sites` - 1 for `skipped` + `years` years, the last of which are kept.
 
     kind : first stocks, one of `KINDS` or like them; site_overrides : of `sim.sample_site`; keep_daily : daily columns

@@ -28,8 +28,10 @@ LIKELY = {
 
 def modelled(run: Run) -> dict[str, np.ndarray]:
     """Fluxes of each site and calendar month, (sites, 12), in `UNITS`."""
-    months = {name: 1000.0 * run.months[f"{name}_kgc_m2"].mean(axis=0)
-              for name in ("gpp", "autotrophic_respiration", "heterotrophic_respiration")}  # fmt: skip
+    months = {
+        name: 1000.0 * run.months[f"{name}_kgc_m2"].mean(axis=0)
+        for name in ("gpp", "autotrophic_respiration", "heterotrophic_respiration")
+    }
     reco = months["autotrophic_respiration"] + months["heterotrophic_respiration"]
     water = run.months["evapotranspiration_mm"].mean(axis=0)
     return {"gpp": months["gpp"], "reco": reco, "nee": reco - months["gpp"], "et": water}

@@ -32,9 +32,38 @@ STEP_MINUTES = (5, 30, 60, 120)
 BOUNDARY_DEPTHS_M = (10.0, 12.0, 15.0, 20.0)
 TALIK_M = 2.0  # mean depth of thaw beyond which a stand is not counted in the active layer's error
 LAYER_EDGES_M = (
-    0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4, 1.7, 2.0, 2.5, 3.0, 3.5,
-    4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0,
-)  # fmt: skip
+    0.0,
+    0.05,
+    0.1,
+    0.15,
+    0.2,
+    0.25,
+    0.3,
+    0.4,
+    0.5,
+    0.6,
+    0.7,
+    0.8,
+    0.9,
+    1.0,
+    1.1,
+    1.25,
+    1.4,
+    1.7,
+    2.0,
+    2.5,
+    3.0,
+    3.5,
+    4.0,
+    5.0,
+    6.0,
+    7.0,
+    8.0,
+    9.0,
+    10.0,
+    11.0,
+    12.0,
+)
 SURFACE_DEPTH, DEEP_NODE, BOUNDARY = (
     CONSTANTS[name].low for name in ("surface_soil_depth_m", "deep_soil_node_m", "boundary_depth_m")
 )
@@ -140,12 +169,13 @@ def run_schemes(args: Args, schemes: dict[str, Grid]) -> tuple[pd.DataFrame, pd.
             warming, cooling, thawed, profiles = map(np.array, zip(*(year[stand][k] for year in years), strict=True))
             reference = np.array([year[stand][0][-1] for year in years])
             rows[name, site, policy] = {
-                "boundary_warming_mj_m2": warming.mean(), "boundary_cooling_mj_m2": cooling.mean(),
+                "boundary_warming_mj_m2": warming.mean(),
+                "boundary_cooling_mj_m2": cooling.mean(),
                 "thaw_return": thaw_return(warming, cooling),
                 "active_layer_depth_m": np.nan if few else thawed.mean(),
                 "surface_soil_temperature_c": layer_mean(profiles, grid.edges, depth).mean(),
                 "reference_c": layer_mean(reference, LAYER_EDGES_M, depth).mean(),
-            }  # fmt: skip
+            }
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis(["scheme", *names.names])
     return table, record_means(records, names)
 
@@ -173,9 +203,13 @@ def thaw_skill(values: pd.Series, reference: pd.Series) -> dict[str, float]:
     """Errors of thaw returns by (site, policy), and of the policies' effects on them."""
     error, effect, true = values - reference, policy_effects(values), policy_effects(reference)
     return {
-        "thaw return": values.mean(), "bias": error.mean(), "rms": rms(error), "median abs": error.abs().median(),
-        "policies: slope": effect @ true / (true @ true), "policies: rms": rms(effect - true),
-    }  # fmt: skip
+        "thaw return": values.mean(),
+        "bias": error.mean(),
+        "rms": rms(error),
+        "median abs": error.abs().median(),
+        "policies: slope": effect @ true / (true @ true),
+        "policies: rms": rms(effect - true),
+    }
 
 
 def scheme_table(schemes: pd.DataFrame) -> pd.DataFrame:
@@ -187,13 +221,18 @@ def scheme_table(schemes: pd.DataFrame) -> pd.DataFrame:
         rows = schemes.loc[name]
         warmth = rows["surface_soil_temperature_c"] - rows["reference_c"]
         depth = (rows["active_layer_depth_m"] - reference["active_layer_depth_m"])[permafrost]
-        lines.append({
-            "scheme": name,
-            "into boundary": rows["boundary_warming_mj_m2"].mean(), "out": rows["boundary_cooling_mj_m2"].mean(),
-            **thaw_skill(rows["thaw_return"], reference["thaw_return"]),
-            "surface soil [K]": warmth.mean(), "rms [K]": rms(warmth),
-            "active layer [m]": depth.mean(), "rms [m]": rms(depth),
-        })  # fmt: skip
+        lines.append(
+            {
+                "scheme": name,
+                "into boundary": rows["boundary_warming_mj_m2"].mean(),
+                "out": rows["boundary_cooling_mj_m2"].mean(),
+                **thaw_skill(rows["thaw_return"], reference["thaw_return"]),
+                "surface soil [K]": warmth.mean(),
+                "rms [K]": rms(warmth),
+                "active layer [m]": depth.mean(),
+                "rms [m]": rms(depth),
+            }
+        )
     return pd.DataFrame(lines)
 
 
@@ -233,24 +272,34 @@ def markdown(table: pd.DataFrame) -> str:
 def main(args: Args) -> None:
     """Run the three comparisons, print their tables, and write what they are made of."""
     if args.sites < 1 or args.years < 1 or args.first_site < 0:
-        sys.exit(f"error: --sites, --years >= 1, --first-site >= 0 are allowed, "
-                 f"not {args.sites}, {args.years}, {args.first_site}")  # fmt: skip
+        sys.exit(
+            f"error: --sites, --years >= 1, --first-site >= 0 are allowed, "
+            f"not {args.sites}, {args.years}, {args.first_site}"
+        )
     args.output_dir.mkdir(parents=True, exist_ok=True)
     deeper = {f"to {boundary:g} m": layers_to(boundary) for boundary in BOUNDARY_DEPTHS_M}
     schemes, simulated = run_schemes(args, SCHEMES | deeper)
-    depths = pd.DataFrame({
-        "simulator": pd.concat({z: simulate(args, constants={"boundary_depth_m": z}) for z in BOUNDARY_DEPTHS_M},
-                               names=["boundary_depth_m"])["thaw_return"],
-        "15 layers": pd.concat({z: schemes.loc[name] for name, z in zip(deeper, BOUNDARY_DEPTHS_M, strict=True)},
-                               names=["boundary_depth_m"])["thaw_return"],
-    })  # fmt: skip
+    depths = pd.DataFrame(
+        {
+            "simulator": pd.concat(
+                {z: simulate(args, constants={"boundary_depth_m": z}) for z in BOUNDARY_DEPTHS_M},
+                names=["boundary_depth_m"],
+            )["thaw_return"],
+            "15 layers": pd.concat(
+                {z: schemes.loc[name] for name, z in zip(deeper, BOUNDARY_DEPTHS_M, strict=True)},
+                names=["boundary_depth_m"],
+            )["thaw_return"],
+        }
+    )
     itself = simulated.assign(reference_c=schemes.loc["two nodes: the simulator's"]["reference_c"])[schemes.columns]
     schemes = pd.concat([schemes.loc[list(SCHEMES)], pd.concat({"the simulator itself": itself}, names=["scheme"])])
     steps = pd.concat({m: simulate(args, time_step_minutes=m) for m in STEP_MINUTES}, names=["minutes"])
 
     effects = policy_effects(simulated["thaw_return"])
-    print(f"{len(simulated)} stands, {args.years} years; the policies change the simulator's thaw return by "
-          f"{effects.mean():+.2f}, rms {rms(effects):.2f}")  # fmt: skip
+    print(
+        f"{len(simulated)} stands, {args.years} years; the policies change the simulator's thaw return by "
+        f"{effects.mean():+.2f}, rms {rms(effects):.2f}"
+    )
     for table in (scheme_table(schemes), step_table(steps), boundary_table(depths)):
         print(f"\n{markdown(table)}")
     steps = steps[[*QUANTITIES.values()]]

@@ -46,12 +46,8 @@ class Quantity:
 RESPIRATION = ("autotrophic_respiration_kgc_m2", "heterotrophic_respiration_kgc_m2")
 QUANTITIES = {
     "GPP": Quantity("gC m-2 day-1", "gpp_gc_m2", ("gpp_kgc_m2",), 1000.0, digits=2),
-    "ecosystem respiration": Quantity(
-        "gC m-2 day-1", "respiration_gc_m2", RESPIRATION, 1000.0, digits=2
-    ),
-    "net exchange": Quantity(
-        "gC m-2 day-1", "exchange_gc_m2", RESPIRATION, 1000.0, digits=2, less=("gpp_kgc_m2",)
-    ),
+    "ecosystem respiration": Quantity("gC m-2 day-1", "respiration_gc_m2", RESPIRATION, 1000.0, digits=2),
+    "net exchange": Quantity("gC m-2 day-1", "exchange_gc_m2", RESPIRATION, 1000.0, digits=2, less=("gpp_kgc_m2",)),
     "latent heat": Quantity("W m-2", "latent_heat_w_m2", ("latent_heat_mj_m2",), 1.0 / MJ_PER_DAY),
     "sensible heat": Quantity("W m-2", "sensible_heat_w_m2", ("sensible_heat_mj_m2",), 1.0 / MJ_PER_DAY),
     "net radiation": Quantity("W m-2", "net_radiation_w_m2", ("net_radiation_mj_m2",), 1.0 / MJ_PER_DAY),
@@ -60,16 +56,22 @@ QUANTITIES = {
         "degC", "soil_temperature_c", ("soil_top_temperature_c",), tolerance=1.0, relative=False, largest_rmse=2.0
     ),
     "albedo": Quantity("1", "albedo", ("albedo",), tolerance=0.03, relative=False, digits=3),
-}  # fmt: skip
+}
 
 
 def simulate(stand: TowerStand, forcing: pd.DataFrame, index: pd.DatetimeIndex, repeats: int) -> pd.DataFrame:
     """Daily output for the days `index` of the forcing's years, after running through them `repeats` - 1 times."""
     years = len(forcing.index.year.unique())
     daily = sim.simulate(
-        stand.site, NO_CHANGE, seed=0, years=repeats * years, forcing=forcing, initial=stand.initial,
-        constants=stand.constants, output="daily",
-    )  # fmt: skip
+        stand.site,
+        NO_CHANGE,
+        seed=0,
+        years=repeats * years,
+        forcing=forcing,
+        initial=stand.initial,
+        constants=stand.constants,
+        output="daily",
+    )
     return daily[daily["year"] >= (repeats - 1) * years].set_index(index)
 
 

@@ -111,14 +111,20 @@ def report(repeats: int) -> Part:
     prr_text, prr_misses = _poker_flat_text(alaskan, repeats)
     figures = {
         "validation_SE-Svb.png": tower_figures.draw(
-            "SE-Svb 2019: simulator under the tower's weather", swedish.pairs, swedish.modelled["swe_mm"],
-            "measured, 5 cm", weeks=True,
+            "SE-Svb 2019: simulator under the tower's weather",
+            swedish.pairs,
+            swedish.modelled["swe_mm"],
+            "measured, 5 cm",
+            weeks=True,
         ),
         "validation_US-Prr.png": tower_figures.draw(
-            "US-Prr 2011-14: simulator under the tower's weather", alaskan.pairs, alaskan.modelled["swe_mm"],
-            "measured, 5 cm below the moss", weeks=False,
+            "US-Prr 2011-14: simulator under the tower's weather",
+            alaskan.pairs,
+            alaskan.modelled["swe_mm"],
+            "measured, 5 cm below the moss",
+            weeks=False,
         ),
-    }  # fmt: skip
+    }
     return Part(f"{_INTRODUCTION}\n\n{svb_text}\n\n{prr_text}", figures, [*misses, *svb_misses, *prr_misses])
 
 

@@ -40,12 +40,19 @@ class Statistic:
 STATISTICS = {
     "temperature": Statistic("air temperature", "degC", 1.5, False, "one cosine for the year", 1),
     "spread": Statistic(
-        "standard deviation of daily temperature", "K", 0.25, True,
-        "the paper's 1-2 degC, the same all year; records have 3 in summer, 8-9 in winter", 1,
+        "standard deviation of daily temperature",
+        "K",
+        0.25,
+        True,
+        "the paper's 1-2 degC, the same all year; records have 3 in summer, 8-9 in winter",
+        1,
     ),
     "persistence": Statistic("lag-1 autocorrelation of it", "1", 0.1, False, "one value for all seasons"),
     "precipitation": Statistic(
-        "precipitation", "mm day-1", 0.25, True,
+        "precipitation",
+        "mm day-1",
+        0.25,
+        True,
         "the paper's wet-day probabilities and amounts; shoulder seasons are dry (0.05-0.15 a day)",
     ),
     "wet days": Statistic(
@@ -55,7 +62,7 @@ STATISTICS = {
         "mean amount of a wet day", "mm", 0.25, True, "the paper's amounts: summer 10-20 mm, observed 4", 1
     ),
     "shortwave": Statistic("shortwave", "W m-2", 0.15, True, "clearness by season", 0),
-}  # fmt: skip
+}
 
 
 def of_days(temperature: np.ndarray, precipitation: np.ndarray, shortwave: np.ndarray) -> dict[str, np.ndarray]:
@@ -113,9 +120,7 @@ def report(sites: int, repeats: int) -> Part:
     repeats : times that a tower's year is run, as of `calibration.evaporative_fractions`.
     """
     sampled = hold(KINDS["open"], sites, YEARS, mechanisms=UNDISTURBED, keep_daily=DAILY)
-    alike = hold(
-        KINDS["open"], sites, YEARS, mechanisms=UNDISTURBED, keep_daily=DAILY, site_overrides=US_PRR_CLIMATE
-    )  # fmt: skip
+    alike = hold(KINDS["open"], sites, YEARS, mechanisms=UNDISTURBED, keep_daily=DAILY, site_overrides=US_PRR_CLIMATE)
     records = climate_records.records()
     here, there = of_run(sampled), of_run(alike)
     towers = {name: of_climate(records[name]) for name in ("US-Prr", "ERA-Interim")}
@@ -127,8 +132,16 @@ def report(sites: int, repeats: int) -> Part:
     winter = [month - 1 for month in calibration.WINTER_HALF]
     unscaled = here["precipitation"][:, winter].mean() / CONSTANTS["snowfall_scale"].low
     calibrated, more = calibration.report(share, unscaled, repeats)
-    header = ["", "season", "generator, sampled sites", "generator, US-Prr's climate", "ERA-Interim 1989-2014",
-              "US-Prr 2011-14", "forest towers", "verdict"]  # fmt: skip
+    header = [
+        "",
+        "season",
+        "generator, sampled sites",
+        "generator, US-Prr's climate",
+        "ERA-Interim 1989-2014",
+        "US-Prr 2011-14",
+        "forest towers",
+        "verdict",
+    ]
     text = f"""Weather of {YEARS} years on {sites} sampled sites (median, 10-90 %), and on the same sites with latitude,
 mean annual temperature and seasonal amplitude of US-Prr. The records at US-Prr are ERA-Interim, debiased by
 FLUXNET2015 (26 years), and the tower's own (its winter precipitation is under-caught); forest towers are those of part
@@ -159,11 +172,18 @@ def _table(here, there, towers, forests) -> tuple[list[list[str]], list[Miss]]:
             limit = statistic.tolerance * (abs(era) if statistic.relative else 1.0)
             verdict = "in" if abs(generated - era) <= limit else "**MISS**"
             forest = forests[name][season] if name in forests else None
-            rows.append([
-                f"{statistic.label} [{statistic.unit}]" if statistic.unit != "1" else statistic.label, season,
-                _spread(seasons["here"][season], digits), number(generated, digits), number(era, digits),
-                number(tower, digits), "-" if forest is None else _range(forest, digits), verdict,
-            ])  # fmt: skip
+            rows.append(
+                [
+                    f"{statistic.label} [{statistic.unit}]" if statistic.unit != "1" else statistic.label,
+                    season,
+                    _spread(seasons["here"][season], digits),
+                    number(generated, digits),
+                    number(era, digits),
+                    number(tower, digits),
+                    "-" if forest is None else _range(forest, digits),
+                    verdict,
+                ]
+            )
             if verdict != "in":
                 what = f"{statistic.label}, {season}: {number(generated, digits)}, record {number(era, digits)}"
                 misses.append(Miss("weather", what, statistic.likely))
