@@ -816,7 +816,7 @@ class BorealEnv(gym.Env, EzPickle):
         if self.render_mode is None:
             return None
         self._episodes.check_begun("picture")
-        from analysis.drawing import draw_stand
+        from sim.task.picture import draw_stand
 
         return draw_stand(self._episodes, 0)
 

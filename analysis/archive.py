@@ -15,7 +15,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis import protocol, runs
+from analysis import runs
+from cleanrl_style import protocol
 
 MOST_EPISODES = 6000
 FLOAT_FORMAT = "%.6g"

@@ -27,8 +27,8 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import protocol
 from analysis.machine import machine
+from cleanrl_style import protocol
 from sim.block import HALF, LANES, compile_kernels
 from sim.draws import draw_year
 from sim.stands import available_cores

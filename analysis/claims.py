@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis import experiments, protocol, runs
+from analysis import experiments, runs
 from analysis.paper_claims import (
     asymmetry,
     curriculum,
@@ -40,6 +40,7 @@ from analysis.paper_claims.claim import (
 )
 from analysis.paper_claims.evidence import Evidence
 from analysis.results import Results
+from cleanrl_style import protocol
 
 THEMES = (environment, asymmetry, performance, preference, curriculum, mechanisms, strategies, speed, paper_itself)
 MEANING = {

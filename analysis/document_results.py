@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import experiments, metrics, protocol, runs
+from analysis import experiments, metrics, runs
 from analysis.results import METHODS, TITLES, Results
 from analysis.tables import distance_to_best, main_results, single_sites
 from analysis.tables.common import GENERALIST, over_seeds
+from cleanrl_style import protocol
 
 PAGES = (
     "README.md",

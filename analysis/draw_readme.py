@@ -18,8 +18,8 @@ import tyro
 from PIL import Image
 
 import boreal_env
-from analysis import protocol
 from baselines_heuristic import conifer_restoration
+from cleanrl_style import protocol
 
 SEED, YEARS, PLANTING_YEARS = 11, 35, 12
 PLANT_100_HALF_CONIFER = 22

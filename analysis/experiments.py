@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from analysis.protocol.evaluation import MODES
 from analysis.runs import setting
+from cleanrl_style.protocol.evaluation import MODES
 
 ROOT = Path(__file__).parents[1]
 HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")

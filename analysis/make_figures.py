@@ -13,7 +13,6 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
-from analysis import protocol
 from analysis.figures import (
     algorithm_comparison,
     demographics,
@@ -30,6 +29,7 @@ from analysis.figures import (
 from analysis.figures.common import STYLE, save
 from analysis.make_tables import name_of
 from analysis.results import Results
+from cleanrl_style import protocol
 
 FIGURES = (
     learning_curves,

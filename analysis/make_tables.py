@@ -11,7 +11,6 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis import protocol
 from analysis.results import Results
 from analysis.tables import (
     curriculum_selection,
@@ -29,6 +28,7 @@ from analysis.tables import (
     warming_flux,
 )
 from analysis.tables.common import readable, write_table
+from cleanrl_style import protocol
 
 TABLES = (
     main_results,

@@ -17,9 +17,9 @@ import numba
 import numpy as np
 import pandas as pd
 
-from analysis import protocol
 from analysis.benchmark import per_step, started
 from analysis.machine import machine
+from cleanrl_style import protocol
 from sim import arrival, solve, step, transfer
 from sim.block import LANES
 from sim.day import begin_day, end_day

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Literal
 
 import boreal_env
-from analysis import archive, claims, document_results, experiments, make_figures, make_tables, protocol, runs
+from analysis import archive, claims, document_results, experiments, make_figures, make_tables, runs
+from cleanrl_style import protocol
 from sim.stands import available_cores
 
 Experiment = Literal[

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.protocol.evaluation import EVALUATION_COLUMNS, MODES
+from cleanrl_style.protocol.evaluation import EVALUATION_COLUMNS, MODES
 
 RUNS_DIR, ARCHIVE_DIR = Path("runs"), Path("results/runs")
 QUICK = "quick"  # folder of runs/ with the runs of `reproduce.py --quick`, which are no results

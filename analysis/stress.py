@@ -24,7 +24,7 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import protocol
+from cleanrl_style import protocol
 from sim.block import LANES, compile_kernels
 from sim.closure import TOLERANCES
 from sim.demography import AGES

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from analysis import protocol
 from analysis.validation import bands, disturbance_report, document, seasonal_fluxes, tower_report, weather_report
 from analysis.validation.document import Part
+from cleanrl_style import protocol
 
 QUICK_SITES = 16
 FULL_DOCUMENT = Path("docs")

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from analysis import protocol
+from cleanrl_style import protocol
 
 
 @dataclass

@@ -15,7 +15,7 @@ import torch.optim as optim
 from torch.distributions.categorical import Categorical
 
 import boreal_env
-from analysis import protocol
+from cleanrl_style import protocol
 
 
 @dataclass

@@ -1,8 +1,8 @@
 import numpy as np
 import pandas as pd
 
-from analysis import protocol
 from analysis.studies import constant_plans
+from cleanrl_style import protocol
 
 
 def test_a_plan_is_carried_out_where_it_is_valid(monkeypatch):

@@ -8,8 +8,7 @@ import torch
 from scripts import ROOT, run_script
 from toy_env import optimal_return
 
-from analysis import protocol
-from cleanrl_style import eupg_fixed_lambda, eupg_var_lambda
+from cleanrl_style import eupg_fixed_lambda, eupg_var_lambda, protocol
 from cleanrl_style.eupg_var_lambda import Agent, compute_utilities, eupg_loss, policy_input
 
 STEPS, SIZE = 6, 5

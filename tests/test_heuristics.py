@@ -3,9 +3,9 @@ import pandas as pd
 import pytest
 from scripts import run_script
 
-from analysis import protocol
-from analysis.protocol import evaluation
 from baselines_heuristic import Args, conifer_restoration, plus_100, random_valid, target_density, zero_change
+from cleanrl_style import protocol
+from cleanrl_style.protocol import evaluation
 
 SCRIPTS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 

@@ -3,8 +3,8 @@ import pandas as pd
 import pytest
 from scripts import run_script
 
-from analysis.protocol.evaluation import EVAL_WEIGHTS
 from analysis.studies import constant_plans, mechanism_pairs, site_warming, stored
+from cleanrl_style.protocol.evaluation import EVAL_WEIGHTS
 
 
 def test_a_pair_differs_in_its_one_thing(monkeypatch):

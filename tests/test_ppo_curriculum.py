@@ -13,9 +13,9 @@ from scripts import ROOT, run_script
 from toy_env import optimal_return
 
 import boreal_env
-from analysis import protocol
-from analysis.protocol import run_folder
+from cleanrl_style import protocol
 from cleanrl_style.ppo_curriculum import Agent, Args, Curriculum, compute_gae, weigh_advantages
+from cleanrl_style.protocol import run_folder
 
 SCRIPT = "cleanrl_style/ppo_curriculum.py"
 OBSERVATIONS = 105

@@ -7,9 +7,9 @@ import pytest
 from scripts import run_script
 from toy_env import LENGTH, optimal_return
 
-from analysis import protocol
-from analysis.protocol import evaluation, run_folder
-from analysis.protocol.progress import Progress
+from cleanrl_style import protocol
+from cleanrl_style.protocol import evaluation, run_folder
+from cleanrl_style.protocol.progress import Progress
 
 
 @dataclass

@@ -9,8 +9,9 @@ from scripts import run_script
 from tiny_runs import TINY_RUNS
 
 import boreal_env
-from analysis import experiments, protocol, reproduce, runs
+from analysis import experiments, reproduce, runs
 from analysis.experiments import Job
+from cleanrl_style import protocol
 from cleanrl_style.ppo_gated import Args
 
 COUNTS = {

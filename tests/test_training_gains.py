@@ -5,8 +5,9 @@ import pytest
 from tiny_runs import TINY_RUNS
 
 import boreal_env
-from analysis import protocol, runs
+from analysis import runs
 from analysis.studies import training_gains
+from cleanrl_style import protocol
 
 YEARS = boreal_env.DEFAULT_YEARS
 

@@ -8,9 +8,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from analysis import metrics, protocol
+from analysis import metrics
 from analysis.experiments import METHODS
 from analysis.results import TITLES
+from cleanrl_style import protocol
 
 STYLE = {
     "font.size": 8,

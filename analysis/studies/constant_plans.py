@@ -17,9 +17,10 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import experiments, protocol, results
+from analysis import experiments, results
 from analysis.studies import open_loop, stored
 from analysis.studies.measure_balance import where_valid
+from cleanrl_style import protocol
 
 ENVIRONMENTS, ONE_SITE = ("boreal-generalist-v0", "boreal-balanced-v0"), "boreal-site-specific-v0"
 PLANTING = tuple(range(15, 25))  # +50 and +100, five mixes each

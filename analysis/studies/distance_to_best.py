@@ -22,9 +22,10 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import experiments, metrics, protocol, results, runs
-from analysis.protocol import evaluation
+from analysis import experiments, metrics, results, runs
 from analysis.studies import open_loop, stored
+from cleanrl_style import protocol
+from cleanrl_style.protocol import evaluation
 
 FRONTS_DIR = Path("results/fronts")
 WEIGHTS = experiments.WEIGHTS

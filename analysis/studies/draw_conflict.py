@@ -13,9 +13,9 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from analysis import protocol
 from analysis.studies import open_loop, stored
 from analysis.studies.fronts import ALL_ON, GAINS, YEARS, path_of, plan_means, with_gains
+from cleanrl_style import protocol
 
 MADE_BY = {"fronts": "fronts.py", "fronts/mechanisms": "fronts.py --without-mechanisms", "variance": "variance.py"}
 COLUMNS = 4

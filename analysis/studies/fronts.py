@@ -17,10 +17,10 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import protocol
 from analysis.metrics import hypervolume
 from analysis.studies import nsga2, open_loop, stored
 from analysis.studies.nsga2 import Budget
+from cleanrl_style import protocol
 
 YEARS = 50
 BLOCK_YEARS = 5

@@ -20,9 +20,10 @@ import pandas as pd
 import torch
 
 import boreal_env
-from analysis import protocol, results
+from analysis import results
 from analysis.studies import open_loop, stored
 from cleanrl_style import eupg_var_lambda as eupg
+from cleanrl_style import protocol
 
 ENV_ID = "boreal-generalist-v0"
 AGENT_SEED = 1

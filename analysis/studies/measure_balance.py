@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import boreal_env
-from analysis import protocol
-from analysis.protocol.evaluation import final_info
 from baselines_heuristic import conifer_restoration, plus_100, target_density, zero_change
+from cleanrl_style import protocol
+from cleanrl_style.protocol.evaluation import final_info
 
 FIRST_SEED = 2_000_000_000  # met neither in training nor in evaluation
 

@@ -17,8 +17,9 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import protocol, results
+from analysis import results
 from analysis.studies import open_loop, stored
+from cleanrl_style import protocol
 
 YEARS = 50
 STAND = {

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.protocol import FLOAT_FORMAT, replacing
+from cleanrl_style.protocol import FLOAT_FORMAT, replacing
 
 
 def write(path: Path, table: pd.DataFrame, settings: dict) -> None:

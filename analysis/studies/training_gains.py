@@ -17,8 +17,9 @@ import numpy as np
 import pandas as pd
 
 import boreal_env
-from analysis import experiments, protocol, results
+from analysis import experiments, results
 from analysis.studies import open_loop, stored
+from cleanrl_style import protocol
 
 EVERY = 8
 STREAM = ["num_envs", "seed"]  # what fixes the episodes of a training in generalist mode

@@ -17,8 +17,8 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import protocol
 from analysis.studies import open_loop, stored
+from cleanrl_style import protocol
 
 YEARS = 50
 FACTORS = ("site", "weather", "policy")

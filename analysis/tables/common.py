@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import metrics, protocol
-from analysis.protocol import FLOAT_FORMAT
+from analysis import metrics
+from cleanrl_style import protocol
+from cleanrl_style.protocol import FLOAT_FORMAT
 
 PAPER_TABLES = Path(__file__).parents[1] / "paper_tables"
 GENERALIST = "boreal-generalist-v0"

@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.protocol.evaluation import EVAL_WEIGHTS
 from analysis.results import METHODS
 from analysis.studies.constant_plans import as_evaluation
 from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
+from cleanrl_style.protocol.evaluation import EVAL_WEIGHTS
 
 TITLE = "Main results"
 ENVIRONMENTS = (GENERALIST, "boreal-balanced-v0")

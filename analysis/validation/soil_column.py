@@ -19,9 +19,9 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import protocol
 from analysis.validation.conduction import Column, Grid, Ground, Surface, layer_mean, spun_up, thawed_depth
 from analysis.validation.surface import RecordedStands
+from cleanrl_style import protocol
 from sim.parameters import CONSTANTS
 from sim.stands import available_cores
 from sim.state import DAILY, DAYS, PARAMETER_NAMES, STATE_NAMES

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.protocol.evaluation import EVALUATION_COLUMNS
+from cleanrl_style.protocol.evaluation import EVALUATION_COLUMNS
 
 TINY_RUNS = Path(__file__).parent
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis import metrics
+from cleanrl_style.protocol import fronts
 
 OBJECTIVE_COLOURS = {"carbon_return": "tab:green", "thaw_return": "tab:blue", "scalarized_return": "black"}
 
@@ -25,10 +25,10 @@ def print_table(evaluation: pd.DataFrame) -> None:
             + "".join("{:9.2f}{:8.2f}{:12.2f}".format(*table.loc[weight]) for table in (sampled, greedy))
         )
     print("  mean" + "".join("{:9.2f}{:8.2f}{:12.2f}".format(*table.mean()) for table in (sampled, greedy)))
-    front = sampled[metrics.OBJECTIVES].to_numpy()
+    front = sampled[fronts.OBJECTIVES].to_numpy()
     print(
-        f"sampled policy: hypervolume {metrics.hypervolume(front):.2f} above {metrics.REFERENCE_POINT}, "
-        f"sparsity {metrics.sparsity(front):.3g}\n"
+        f"sampled policy: hypervolume {fronts.hypervolume(front):.2f} above {fronts.REFERENCE_POINT}, "
+        f"sparsity {fronts.sparsity(front):.3g}\n"
     )
 
 
@@ -73,7 +73,7 @@ def _draw_years(axes, years: pd.DataFrame) -> None:
 
 def _draw_trade_off(figure, ax, evaluation: pd.DataFrame) -> None:
     for policy, marker in (("sampled", "o"), ("greedy", "^")):
-        means = metrics.mean_returns(evaluation[evaluation.policy == policy])
+        means = fronts.mean_returns(evaluation[evaluation.policy == policy])
         points = ax.scatter(
             means.thaw_return,
             means.carbon_return,

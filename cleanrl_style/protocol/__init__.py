@@ -4,9 +4,8 @@ A script calls `prepare` (arguments), opens its `Run` (folder), trains on `run.m
 checkpoints and shows `Progress` meanwhile, and ends with `evaluate` and `run.finish`.
 """
 
-from analysis.metrics import scalarize  # noqa: F401
-from analysis.protocol.arguments import LIMITS, MAX_ENVS, fail, not_default, parse, prepare, resolve  # noqa: F401
-from analysis.protocol.evaluation import (  # noqa: F401
+from cleanrl_style.protocol.arguments import LIMITS, MAX_ENVS, fail, not_default, parse, prepare, resolve  # noqa: F401
+from cleanrl_style.protocol.evaluation import (  # noqa: F401
     EVAL_WEIGHTS,
     FIRST_EVALUATION_SEED,
     MODES,
@@ -15,8 +14,9 @@ from analysis.protocol.evaluation import (  # noqa: F401
     evaluate,
     final_info,
 )
-from analysis.protocol.progress import Progress  # noqa: F401
-from analysis.protocol.run_folder import (  # noqa: F401
+from cleanrl_style.protocol.fronts import scalarize  # noqa: F401
+from cleanrl_style.protocol.progress import Progress  # noqa: F401
+from cleanrl_style.protocol.run_folder import (  # noqa: F401
     EPISODE_COLUMNS,
     EPISODE_INFO,
     FLOAT_FORMAT,

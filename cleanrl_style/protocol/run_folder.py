@@ -22,9 +22,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from analysis.protocol import tracking, training_envs
-from analysis.protocol.arguments import FREE_ARGUMENTS, fail, not_default
-from analysis.protocol.summary import draw_summary, print_table
+from cleanrl_style.protocol import tracking, training_envs
+from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, fail, not_default
+from cleanrl_style.protocol.summary import draw_summary, print_table
 
 try:
     import fcntl

@@ -9,7 +9,7 @@ import gymnasium as gym
 import tyro
 
 import boreal_env
-from analysis.protocol.evaluation import FIRST_EVALUATION_SEED, MODES, as_mask
+from cleanrl_style.protocol.evaluation import FIRST_EVALUATION_SEED, MODES, as_mask
 
 MAX_ENVS = 1000
 # Arguments that change nothing in what a run computes.

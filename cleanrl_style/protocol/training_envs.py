@@ -10,8 +10,8 @@ from functools import partial
 import gymnasium as gym
 import numpy as np
 
-from analysis.protocol.arguments import fail
-from analysis.protocol.evaluation import MODES
+from cleanrl_style.protocol.arguments import fail
+from cleanrl_style.protocol.evaluation import MODES
 
 
 class InWorker(gym.Wrapper):

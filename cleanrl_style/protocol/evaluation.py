@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 
 import boreal_env
-from analysis.metrics import scalarize
-from analysis.protocol.progress import Progress
+from cleanrl_style.protocol.fronts import scalarize
+from cleanrl_style.protocol.progress import Progress
 
 # The mode of each id of this benchmark; any other id is a user's own environment.
 MODES = {

@@ -10,8 +10,8 @@ from PIL import Image
 
 import boreal_env
 from analysis import draw_readme
-from analysis.drawing import HEIGHT, WIDTH
 from cleanrl_style import ppo_curriculum
+from sim.task.picture import HEIGHT, WIDTH
 
 NO_FIRE = {"fire": False, "insects": False}
 
