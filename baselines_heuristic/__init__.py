@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts
 
 
 @dataclass
@@ -23,12 +24,12 @@ class Args:
     """a new site and weather in every episode, or one fixed site (None: the environment's)"""
     site_seed: int | None = None
     """another fixed site in site-specific mode; in generalist mode one site, under new weather in every episode"""
-    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
-    """formula of the thaw reward"""
+    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] | None = None
+    """formula of the thaw reward (None: the environment's, asymmetric)"""
     eval_episodes: int = 100
     """evaluation episodes per weight"""
-    eval_weights: tuple[float, ...] = protocol.EVAL_WEIGHTS
-    """carbon weights of the evaluation"""
+    eval_weights: tuple[float, ...] | None = None
+    """carbon weights of the evaluation (None: 0 0.1 .. 1); of three and more objectives, as many numbers a weight"""
     run_dir: str | None = None
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False
@@ -43,27 +44,29 @@ def main(script: str, policy) -> None:
     stay random.
     """
     args = protocol.parse(Args)
-    env_kwargs = protocol.prepare(args)
-    if args.env_id not in protocol.MODES:
-        protocol.fail(f"--env-id must be one of {', '.join(protocol.MODES)}, not {args.env_id}")
+    task = protocol.make_task(args)
+    if not task.boreal:
+        protocol.fail(f"--env-id {args.env_id}: fixed strategies know the boreal environments alone")
 
     def action_probabilities(observations, masks, accrued_returns):
         chosen = policy(observations, masks)
         return np.eye(25)[chosen] if chosen.ndim == 1 else chosen
 
-    with protocol.Run(args, Path(script).stem) as run:
+    with protocol.Run(args, task, Path(script).stem) as run:
         start = time.perf_counter()
-        episodes, years = protocol.evaluate(args, env_kwargs, action_probabilities, (0.0,), ("sampled",))
+        corner = np.eye(task.num_objectives)[0]
+        episodes, years = protocol.evaluate(task, action_probabilities, [corner], args.eval_episodes, ("sampled",))
         run.time("evaluation", 0, time.perf_counter() - start)
-        run.finish(repeat(episodes, args.eval_weights), repeat(years, args.eval_weights))
+        run.finish(*(repeat(task, table, args.eval_weights) for table in (episodes, years)))
 
 
-def repeat(table: pd.DataFrame, weights) -> pd.DataFrame:
+def repeat(task: protocol.Task, table: pd.DataFrame, weights) -> pd.DataFrame:
     """The table once for every policy and weight, scalarised anew."""
-    copies = [table.assign(policy=policy, preference=weight) for policy in protocol.POLICIES for weight in weights]
-    repeated = pd.concat(copies, ignore_index=True)
-    if "scalarized_return" in repeated:
-        repeated["scalarized_return"] = protocol.scalarize(
-            repeated.carbon_return, repeated.thaw_return, repeated.preference
-        )
-    return repeated
+    copies = []
+    for policy in protocol.POLICIES:
+        for its_weights in map(task.check_weights, weights):
+            copy = table.assign(policy=policy, **task.weights_row(its_weights))
+            if "scalarized_return" in copy:
+                copy["scalarized_return"] = protocol.scalarize(fronts.returns_of(copy), its_weights)
+            copies.append(copy)
+    return pd.concat(copies, ignore_index=True)

@@ -14,7 +14,6 @@ import torch.nn as nn
 import torch.optim as optim
 from torch.distributions.categorical import Categorical
 
-import boreal_env
 from cleanrl_style import protocol
 
 
@@ -30,8 +29,8 @@ class Args:
     """a new site and weather in every episode, or one fixed site (None: the environment's)"""
     site_seed: int | None = None
     """another fixed site in site-specific mode; in generalist mode one site, under new weather in every episode"""
-    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
-    """formula of the thaw reward"""
+    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] | None = None
+    """formula of the thaw reward (None: the environment's, asymmetric)"""
     hide_site: bool = False
     """observe no site parameters"""
     total_timesteps: int | None = None
@@ -56,8 +55,8 @@ class Args:
     # Evaluation and output
     eval_episodes: int = 100
     """evaluation episodes per weight"""
-    eval_weights: tuple[float, ...] = protocol.EVAL_WEIGHTS
-    """carbon weights of the evaluation"""
+    eval_weights: tuple[float, ...] | None = None
+    """carbon weights of the evaluation (None: 0 0.1 .. 1); of three and more objectives, as many numbers a weight"""
     run_dir: str | None = None
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False
@@ -75,13 +74,13 @@ def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
 
 
 class Agent(nn.Module):
-    """A policy of the observation and, at its end, of the return accrued so far in both objectives."""
+    """A policy of the observation and, at its end, of the returns accrued so far."""
 
-    def __init__(self, envs):
+    def __init__(self, envs, num_objectives=2):
         super().__init__()
         observation_dim = np.array(envs.single_observation_space.shape).prod()
         self.actor = nn.Sequential(
-            layer_init(nn.Linear(observation_dim + 2, 128)),
+            layer_init(nn.Linear(observation_dim + num_objectives, 128)),
             nn.Tanh(),
             layer_init(nn.Linear(128, 64)),
             nn.Tanh(),
@@ -89,7 +88,7 @@ class Agent(nn.Module):
         )
 
     def get_distribution(self, x, mask):
-        """x (n, observation + 2), mask (n, 25) bool, at least one action valid in each row."""
+        """x (n, observation + m), mask (n, 25) bool, at least one action valid in each row."""
         # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in the entropy
         return Categorical(logits=torch.where(mask, self.actor(x), -1e8), validate_args=False)
 
@@ -102,14 +101,26 @@ class Agent(nn.Module):
 
 
 def policy_input(observations, accrued_returns):
-    """x of the agent (n, observation + 2), for observations (n, observation) and undiscounted returns (n, 2)."""
+    """x of the agent (n, observation + m), for observations (n, observation) and undiscounted returns (n, m)."""
     return torch.from_numpy(np.hstack([observations, accrued_returns / 50]).astype(np.float32))
 
 
-def compute_utilities(rewards, preferences, gamma, which, baseline="none"):
-    """Utility (steps, n) that weights each step's gradient, of n episodes with rewards (steps, n, 2).
+def make_policy(agent):
+    """Action probabilities (n, 25) of observations (n, d), masks (n, 25) and accrued returns (n, m)."""
 
-    The utility of a return is its scalarisation by the episode's preference (n,). "total" is that of the whole
+    def action_probabilities(observations, masks, accrued_returns):
+        with torch.no_grad():
+            x = policy_input(observations, accrued_returns)
+            distribution = agent.get_distribution(x, torch.from_numpy(masks))
+        return distribution.probs.numpy()
+
+    return action_probabilities
+
+
+def compute_utilities(rewards, preferences, gamma, which, baseline="none"):
+    """Utility (steps, n) that weights each step's gradient, of n episodes with rewards (steps, n, m).
+
+    The utility of a return is its scalarisation by the episode's preference (n, m). "total" is that of the whole
     return, accrued before the step and future, the same for all steps; "future" that of what comes from the step on.
     "others" takes it less the other episodes' mean, which changes no expected gradient: it knows nothing of the action.
     """
@@ -120,7 +131,7 @@ def compute_utilities(rewards, preferences, gamma, which, baseline="none"):
     returns = to_go if which == "future" else np.broadcast_to(to_go[0], to_go.shape)
     if baseline == "others":
         returns = returns - (returns.sum(axis=1, keepdims=True) - returns) / (returns.shape[1] - 1)
-    return protocol.scalarize(returns[..., 0], returns[..., 1], preferences)
+    return protocol.scalarize(returns, preferences)
 
 
 def eupg_loss(agent, x, mask, action, utility):
@@ -131,8 +142,8 @@ def eupg_loss(agent, x, mask, action, utility):
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
-    env_kwargs = protocol.prepare(args)
-    episode_columns = protocol.EPISODE_COLUMNS
+    task = protocol.make_task(args)
+    episode_columns = task.episode_columns
     update_columns = (
         "iteration",
         "global_step",
@@ -144,13 +155,13 @@ if __name__ == "__main__":
     )
     if args.baseline == "others" and args.num_envs == 1:
         protocol.fail("--baseline others is the mean of a batch's other episodes: --num-envs 1 has none")
-    if args.env_id in protocol.MODES and args.total_timesteps < boreal_env.DEFAULT_YEARS * args.num_envs:
+    if task.years and args.total_timesteps < task.years * args.num_envs:
         protocol.fail(
             f"--total-timesteps {args.total_timesteps} has no room for a batch, an episode of each "
-            f"environment: {boreal_env.DEFAULT_YEARS * args.num_envs} steps"
+            f"environment: {task.years * args.num_envs} steps"
         )
 
-    with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
+    with protocol.Run(args, task, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
         # TRY NOT TO MODIFY: seeding
         random.seed(args.seed)
         np.random.seed(args.seed)
@@ -158,12 +169,9 @@ if __name__ == "__main__":
         torch.set_num_threads(1)
 
         # env setup
-        if args.env_id in protocol.MODES:
-            print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-            boreal_env.warm_up(args.num_envs if args.vectorization == "lockstep" else 1)  # before workers are forked
-        envs = run.make_envs(env_kwargs)
+        envs = run.make_envs()
 
-        agent = Agent(envs)
+        agent = Agent(envs, task.num_objectives)
         optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate)
 
         # TRY NOT TO MODIFY: start the game
@@ -178,20 +186,20 @@ if __name__ == "__main__":
             iteration, global_step, episode = state["iteration"], state["global_step"], state["episode"]
             next_obs, batch_steps = state["next_obs"], state["batch_steps"]
 
-        progress = protocol.Progress("training", args.total_timesteps, "steps", global_step)
+        progress = protocol.Progress("training", args.total_timesteps, "steps", global_step, task.objectives)
 
         # a batch is an episode of every environment; the last one is the last that the total has room for
         while global_step + batch_steps <= args.total_timesteps:
             iteration += 1
             obs, masks, actions, rewards = [], [], [], []
             next_done = np.zeros(args.num_envs, dtype=bool)
-            episode_returns = np.zeros((args.num_envs, 2))
+            episode_returns = np.zeros((args.num_envs, task.num_objectives))
             rollout_start, env_seconds = time.perf_counter(), 0.0
 
             while not next_done.any():
                 global_step += args.num_envs
                 obs.append(policy_input(next_obs, episode_returns))
-                masks.append(torch.from_numpy(protocol.action_masks(envs, next_obs, args.env_id)))
+                masks.append(torch.from_numpy(task.action_masks(envs, next_obs)))
 
                 # ALGO LOGIC: action logic
                 with torch.no_grad():
@@ -199,7 +207,7 @@ if __name__ == "__main__":
                 actions.append(action)
 
                 # TRY NOT TO MODIFY: execute the game and log data.
-                preferences = next_obs[:, 0].astype(np.float64)
+                preferences = protocol.observed_weights(next_obs, task.num_objectives)
                 env_start = time.perf_counter()
                 next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
                 env_seconds += time.perf_counter() - env_start
@@ -219,21 +227,15 @@ if __name__ == "__main__":
                 )
             for i in range(args.num_envs):
                 episode += 1
-                carbon, thaw = episode_returns[i]
-                run.log(
-                    "episodes",
-                    {
-                        "global_step": global_step,
-                        "episode": episode,
-                        "env": i,
-                        "preference": preferences[i],
-                        "carbon_return": carbon,
-                        "thaw_return": thaw,
-                        "scalarized_return": protocol.scalarize(carbon, thaw, preferences[i]),
-                        **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO)),
-                    },
-                )
-                progress.returns.append((carbon, thaw))
+                row = {
+                    "global_step": global_step,
+                    "episode": episode,
+                    "env": i,
+                    **task.returns_row(preferences[i], episode_returns[i]),
+                    **protocol.final_info(infos, i),
+                }
+                run.log("episodes", row)
+                progress.returns.append(episode_returns[i])
             run.time("environment", global_step, env_seconds)
             run.time("rollout", global_step, time.perf_counter() - rollout_start)
             update_start = time.perf_counter()
@@ -281,15 +283,9 @@ if __name__ == "__main__":
             run.save(global_step, last, **state)
 
         envs.close()
-
-        def action_probabilities(observations, masks, accrued_returns):
-            with torch.no_grad():
-                distribution = agent.get_distribution(
-                    policy_input(observations, accrued_returns), torch.from_numpy(masks)
-                )
-            return distribution.probs.numpy()
+        run.save_policy(agent, num_objectives=task.num_objectives)
 
         evaluation_start = time.perf_counter()
-        evaluation, years = protocol.evaluate(args, env_kwargs, action_probabilities)
+        evaluation, years = protocol.evaluate(task, make_policy(agent), args.eval_weights, args.eval_episodes)
         run.time("evaluation", global_step, time.perf_counter() - evaluation_start)
         run.finish(evaluation, years)

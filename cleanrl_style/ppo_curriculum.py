@@ -29,8 +29,8 @@ class Args:
     """a new site and weather in every episode, or one fixed site (None: the environment's)"""
     site_seed: int | None = None
     """another fixed site in site-specific mode; in generalist mode one site, under new weather in every episode"""
-    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
-    """formula of the thaw reward"""
+    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] | None = None
+    """formula of the thaw reward (None: the environment's, asymmetric)"""
     hide_site: bool = False
     """observe no site parameters"""
     total_timesteps: int | None = None
@@ -65,8 +65,8 @@ class Args:
     """weight of the value loss"""
     max_grad_norm: float = 0.5
     """largest norm of the gradient"""
-    reward_scales: tuple[float, float] = (1.0, 1.0)
-    """factors of the carbon and the thaw reward, before they are scalarised for training"""
+    reward_scales: tuple[float, ...] | None = None
+    """factors of the rewards, before they are scalarised for training (None: 1 each)"""
     per_objective_advantages: bool = False
     """a value for each objective, whose advantages are normalised over the rollout before they are scalarised"""
     # CURRICULUM
@@ -80,8 +80,8 @@ class Args:
     # Evaluation and output
     eval_episodes: int = 100
     """evaluation episodes per weight"""
-    eval_weights: tuple[float, ...] = protocol.EVAL_WEIGHTS
-    """carbon weights of the evaluation"""
+    eval_weights: tuple[float, ...] | None = None
+    """carbon weights of the evaluation (None: 0 0.1 .. 1); of three and more objectives, as many numbers a weight"""
     run_dir: str | None = None
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False
@@ -144,6 +144,17 @@ class Agent(nn.Module):
         return action, distribution.log_prob(action), distribution.entropy(), self.critic(x)
 
 
+def make_policy(agent):
+    """Action probabilities (n, 25) of observations (n, d) and masks (n, 25); accrued returns (n, m) are not needed."""
+
+    def action_probabilities(observations, masks, accrued_returns):
+        with torch.no_grad():
+            distribution = agent.get_distribution(torch.from_numpy(observations), torch.from_numpy(masks))
+        return distribution.probs.numpy()
+
+    return action_probabilities
+
+
 def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda):
     """Advantages (steps, envs, values), each value's for itself; dones[t] says that step t follows an episode's end.
 
@@ -160,11 +171,11 @@ def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda
     return advantages
 
 
-def weigh_advantages(advantages, preferences, trained):
-    """Advantages (n,) of two objectives' (n, 2), each first normalised by its mean and deviation over `trained`."""
+def weigh_advantages(advantages, weights, trained):
+    """Advantages (n,) of m objectives' (n, m), each first normalised by its mean and deviation over `trained`."""
     mean = advantages[trained].mean(dim=0)
     std = (advantages[trained] - mean).square().mean(dim=0).sqrt()
-    return protocol.scalarize(*((advantages - mean) / (std + 1e-8)).T, preferences)
+    return protocol.scalarize((advantages - mean) / (std + 1e-8), weights)
 
 
 def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value, args):
@@ -199,26 +210,26 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value
 class Curriculum:
     """Chooses the episodes to train on: those that a fixed random network of the site, or a coin, scores above tau.
 
-    On one site, and without the 62 site observations (site-specific mode), the network accepts all episodes.
+    On one site, and where no site parameters are observed (site-specific mode), the network accepts all episodes.
     """
 
-    NUM_SITE_INPUTS = 62
-
-    def __init__(self, observation_dim, args):
+    def __init__(self, task, args):
         self.coin = np.random.default_rng([args.seed, 1]) if args.selector == "coin" else None
-        sees_sites = args.site_seed is None and observation_dim == len(boreal_env.OBSERVATION_NAMES)
+        self.site_entries = list(task.site_entries)  # of the observation
+        sees_sites = args.site_seed is None and len(self.site_entries) > 0
         self.accepts_all = self.coin is None and not sees_sites
         self.threshold = 0.0 if self.accepts_all else args.threshold
         # a generator of its own: the agent is the one that ppo_gated starts from
         generator = np.random.default_rng(args.seed)
-        sizes = (self.NUM_SITE_INPUTS, 64, 64, 1)
+        sizes = () if self.accepts_all or self.coin else (len(self.site_entries), 64, 64, 1)
         self.layers = [generator.normal(0, n**-0.5, (n, m)) for n, m in zip(sizes[:-1], sizes[1:], strict=True)]
         self.mean, self.std = 0.0, 1.0
         if not args.raw_selector and self.coin is None and not self.accepts_all:
             logits = self.logit(boreal_env.sample_site_observations(range(1000)))
             self.mean, self.std = logits.mean(), logits.std()
-        # sum and number of the returns seen so far in each tenth of the preference
-        self.decile_sum, self.decile_count = np.zeros(10), np.zeros(10)
+        # sum and number of the returns seen so far in each tenth of the preference (of each of its m - 1 weights)
+        self.shape = (10,) * (task.num_objectives - 1)
+        self.decile_sum, self.decile_count = np.zeros(self.shape).ravel(), np.zeros(self.shape).ravel()
         self.finished = []
 
     def logit(self, sites):
@@ -232,7 +243,7 @@ class Curriculum:
             return self.coin.random(len(observations))
         if self.accepts_all:
             return np.ones(len(observations))
-        logits = self.logit(observations[:, -self.NUM_SITE_INPUTS :].astype(np.float64))
+        logits = self.logit(observations[:, self.site_entries].astype(np.float64))
         return 1 / (1 + np.exp(-(logits - self.mean) / self.std))
 
     def update_threshold(self):
@@ -241,9 +252,9 @@ class Curriculum:
         Each return is taken less the running mean of its preference's decile (this rollout's included), since
         the preference sets the level of a return. Gives the numbers of selected and of skipped episodes.
         """
-        preferences, returns, selected = np.array(self.finished).reshape(-1, 3).T
+        *weights, returns, selected = np.array(self.finished).reshape(-1, len(self.shape) + 2).T
         selected = selected.astype(bool)
-        deciles = np.minimum(10 * preferences, 9).astype(int)
+        deciles = np.ravel_multi_index(np.minimum(10 * np.array(weights), 9).astype(int), self.shape)
         np.add.at(self.decile_sum, deciles, returns)
         np.add.at(self.decile_count, deciles, 1)
         if selected.any() and not selected.all():
@@ -256,8 +267,8 @@ class Curriculum:
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
-    env_kwargs = protocol.prepare(args)
-    episode_columns = protocol.EPISODE_COLUMNS
+    task = protocol.make_task(args, hide_site=args.hide_site)
+    episode_columns = task.episode_columns
     update_columns = (
         "iteration",
         "global_step",
@@ -277,7 +288,7 @@ if __name__ == "__main__":
     episode_columns += ("score", "threshold", "selected")
     update_columns += ("threshold", "selected_episodes", "skipped_episodes", "selected_transitions")
 
-    with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
+    with protocol.Run(args, task, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
         # TRY NOT TO MODIFY: seeding
         random.seed(args.seed)
         np.random.seed(args.seed)
@@ -285,12 +296,9 @@ if __name__ == "__main__":
         torch.set_num_threads(1)
 
         # env setup
-        if args.env_id in protocol.MODES:
-            print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-            boreal_env.warm_up(args.num_envs if args.vectorization == "lockstep" else 1)  # before workers are forked
-        envs = run.make_envs(env_kwargs)
+        envs = run.make_envs()
 
-        num_values = 2 if args.per_objective_advantages else 1  # of the scalarised reward
+        num_values = task.num_objectives if args.per_objective_advantages else 1  # of the scalarised reward
         agent = Agent(envs, num_values)
         optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
 
@@ -299,9 +307,9 @@ if __name__ == "__main__":
         start_seed = args.seed * protocol.MAX_ENVS
         next_obs, _ = envs.reset(seed=[start_seed + i for i in range(args.num_envs)])
         next_done = np.zeros(args.num_envs, dtype=bool)
-        episode_returns = np.zeros((args.num_envs, 2))
+        episode_returns = np.zeros((args.num_envs, task.num_objectives))
         # CURRICULUM: of the episode under way in each environment
-        curriculum = Curriculum(next_obs.shape[1], args)
+        curriculum = Curriculum(task, args)
         scores, thresholds = curriculum.score(next_obs), np.full(args.num_envs, curriculum.threshold)
         selected = scores > thresholds
 
@@ -319,7 +327,7 @@ if __name__ == "__main__":
         steps_per_env = args.total_timesteps // args.num_envs
         rollout_length = args.rollout_steps // args.num_envs
         num_iterations = math.ceil(steps_per_env / rollout_length)
-        progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps", global_step)
+        progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps", global_step, task.objectives)
 
         for iteration in range(first_iteration, num_iterations + 1):
             # ALGO Logic: Storage setup (the last rollout may be shorter)
@@ -329,6 +337,7 @@ if __name__ == "__main__":
             actions = torch.zeros((num_steps, args.num_envs), dtype=torch.long)
             logprobs = torch.zeros((num_steps, args.num_envs))
             rewards = torch.zeros((num_steps, args.num_envs, num_values))
+            weights = torch.zeros((num_steps, args.num_envs, task.num_objectives))
             dones = torch.zeros((num_steps, args.num_envs, 1))
             values = torch.zeros((num_steps, args.num_envs, num_values))
             rollout_start, env_seconds = time.perf_counter(), 0.0
@@ -338,7 +347,7 @@ if __name__ == "__main__":
             for step in range(num_steps):
                 global_step += args.num_envs
                 obs[step] = torch.from_numpy(next_obs)
-                masks[step] = torch.from_numpy(protocol.action_masks(envs, next_obs, args.env_id))
+                masks[step] = torch.from_numpy(task.action_masks(envs, next_obs))
                 dones[step] = torch.from_numpy(next_done)[:, None]
                 # CURRICULUM
                 selecteds[step] = torch.from_numpy(selected)
@@ -351,7 +360,7 @@ if __name__ == "__main__":
                 logprobs[step] = logprob
 
                 # TRY NOT TO MODIFY: execute the game and log data.
-                preferences = next_obs[:, 0].astype(np.float64)
+                preferences = protocol.observed_weights(next_obs, task.num_objectives)
                 env_start = time.perf_counter()
                 next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
                 env_seconds += time.perf_counter() - env_start
@@ -359,31 +368,27 @@ if __name__ == "__main__":
                 episode_returns += reward
                 scaled = reward * args.reward_scales
                 if not args.per_objective_advantages:
-                    scaled = protocol.scalarize(scaled[:, :1], scaled[:, 1:], preferences[:, None])
+                    scaled = protocol.scalarize(scaled, preferences)[:, None]
                 rewards[step] = torch.from_numpy(scaled)
+                weights[step] = torch.from_numpy(preferences)
 
                 for i in np.flatnonzero(next_done):
                     episode += 1
-                    carbon, thaw = episode_returns[i]
-                    scalarized_return = protocol.scalarize(carbon, thaw, preferences[i])
                     row = {
                         "global_step": global_step,
                         "episode": episode,
                         "env": i,
-                        "preference": preferences[i],
-                        "carbon_return": carbon,
-                        "thaw_return": thaw,
-                        "scalarized_return": scalarized_return,
-                        **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO)),
+                        **task.returns_row(preferences[i], episode_returns[i]),
+                        **protocol.final_info(infos, i),
                     }
                     # CURRICULUM: note the episode that ended, choose whether to train on the one that begins
                     row |= {"score": scores[i], "threshold": thresholds[i], "selected": int(selected[i])}
-                    curriculum.finished.append((preferences[i], scalarized_return, selected[i]))
+                    curriculum.finished.append((*preferences[i, :-1], row["scalarized_return"], selected[i]))
                     scores[i], thresholds[i] = curriculum.score(next_obs[i : i + 1])[0], curriculum.threshold
                     selected[i] = scores[i] > thresholds[i]
 
                     run.log("episodes", row)
-                    progress.returns.append((carbon, thaw))
+                    progress.returns.append(episode_returns[i].copy())
                     episode_returns[i] = 0
                 progress.show(global_step)
             run.time("environment", global_step, env_seconds)
@@ -411,7 +416,7 @@ if __name__ == "__main__":
 
             # Optimizing the policy and value network
             if args.per_objective_advantages:
-                b_advantages = weigh_advantages(b_advantages, b_obs[:, 0], b_inds)
+                b_advantages = weigh_advantages(b_advantages, weights.flatten(0, 1), b_inds)
             b_advantages = b_advantages.flatten()
             num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
             losses = []
@@ -473,13 +478,9 @@ if __name__ == "__main__":
             run.save(global_step, last=iteration == num_iterations, **state)
 
         envs.close()
-
-        def action_probabilities(observations, masks, accrued_returns):
-            with torch.no_grad():
-                distribution = agent.get_distribution(torch.from_numpy(observations), torch.from_numpy(masks))
-            return distribution.probs.numpy()
+        run.save_policy(agent, num_values=num_values)
 
         evaluation_start = time.perf_counter()
-        evaluation, years = protocol.evaluate(args, env_kwargs, action_probabilities)
+        evaluation, years = protocol.evaluate(task, make_policy(agent), args.eval_weights, args.eval_episodes)
         run.time("evaluation", global_step, time.perf_counter() - evaluation_start)
         run.finish(evaluation, years)

@@ -13,7 +13,6 @@ import torch.nn as nn
 import torch.optim as optim
 from torch.distributions.categorical import Categorical
 
-import boreal_env
 from cleanrl_style import protocol
 
 
@@ -29,8 +28,8 @@ class Args:
     """a new site and weather in every episode, or one fixed site (None: the environment's)"""
     site_seed: int | None = None
     """another fixed site in site-specific mode; in generalist mode one site, under new weather in every episode"""
-    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] = "asymmetric"
-    """formula of the thaw reward"""
+    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] | None = None
+    """formula of the thaw reward (None: the environment's, asymmetric)"""
     hide_site: bool = False
     """observe no site parameters"""
     total_timesteps: int | None = None
@@ -65,16 +64,16 @@ class Args:
     """weight of the value loss"""
     max_grad_norm: float = 0.5
     """largest norm of the gradient"""
-    reward_scales: tuple[float, float] = (1.0, 1.0)
-    """factors of the carbon and the thaw reward, before they are scalarised for training"""
+    reward_scales: tuple[float, ...] | None = None
+    """factors of the rewards, before they are scalarised for training (None: 1 each)"""
     per_objective_advantages: bool = False
     """a value for each objective, whose advantages are normalised over the rollout before they are scalarised"""
 
     # Evaluation and output
     eval_episodes: int = 100
     """evaluation episodes per weight"""
-    eval_weights: tuple[float, ...] = protocol.EVAL_WEIGHTS
-    """carbon weights of the evaluation"""
+    eval_weights: tuple[float, ...] | None = None
+    """carbon weights of the evaluation (None: 0 0.1 .. 1); of three and more objectives, as many numbers a weight"""
     run_dir: str | None = None
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False
@@ -137,6 +136,17 @@ class Agent(nn.Module):
         return action, distribution.log_prob(action), distribution.entropy(), self.critic(x)
 
 
+def make_policy(agent):
+    """Action probabilities (n, 25) of observations (n, d) and masks (n, 25); accrued returns (n, m) are not needed."""
+
+    def action_probabilities(observations, masks, accrued_returns):
+        with torch.no_grad():
+            distribution = agent.get_distribution(torch.from_numpy(observations), torch.from_numpy(masks))
+        return distribution.probs.numpy()
+
+    return action_probabilities
+
+
 def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda):
     """Advantages (steps, envs, values), each value's for itself; dones[t] says that step t follows an episode's end.
 
@@ -153,11 +163,11 @@ def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda
     return advantages
 
 
-def weigh_advantages(advantages, preferences, trained):
-    """Advantages (n,) of two objectives' (n, 2), each first normalised by its mean and deviation over `trained`."""
+def weigh_advantages(advantages, weights, trained):
+    """Advantages (n,) of m objectives' (n, m), each first normalised by its mean and deviation over `trained`."""
     mean = advantages[trained].mean(dim=0)
     std = (advantages[trained] - mean).square().mean(dim=0).sqrt()
-    return protocol.scalarize(*((advantages - mean) / (std + 1e-8)).T, preferences)
+    return protocol.scalarize((advantages - mean) / (std + 1e-8), weights)
 
 
 def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value, args):
@@ -190,8 +200,8 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
-    env_kwargs = protocol.prepare(args)
-    episode_columns = protocol.EPISODE_COLUMNS
+    task = protocol.make_task(args, hide_site=args.hide_site)
+    episode_columns = task.episode_columns
     update_columns = (
         "iteration",
         "global_step",
@@ -204,7 +214,7 @@ if __name__ == "__main__":
         "explained_variance",
     )
 
-    with protocol.Run(args, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
+    with protocol.Run(args, task, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
         # TRY NOT TO MODIFY: seeding
         random.seed(args.seed)
         np.random.seed(args.seed)
@@ -212,12 +222,9 @@ if __name__ == "__main__":
         torch.set_num_threads(1)
 
         # env setup
-        if args.env_id in protocol.MODES:
-            print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-            boreal_env.warm_up(args.num_envs if args.vectorization == "lockstep" else 1)  # before workers are forked
-        envs = run.make_envs(env_kwargs)
+        envs = run.make_envs()
 
-        num_values = 2 if args.per_objective_advantages else 1  # of the scalarised reward
+        num_values = task.num_objectives if args.per_objective_advantages else 1  # of the scalarised reward
         agent = Agent(envs, num_values)
         optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
 
@@ -226,7 +233,7 @@ if __name__ == "__main__":
         start_seed = args.seed * protocol.MAX_ENVS
         next_obs, _ = envs.reset(seed=[start_seed + i for i in range(args.num_envs)])
         next_done = np.zeros(args.num_envs, dtype=bool)
-        episode_returns = np.zeros((args.num_envs, 2))
+        episode_returns = np.zeros((args.num_envs, task.num_objectives))
 
         # RESUME: all is as when the checkpoint was written
         if state := run.resume():
@@ -239,7 +246,7 @@ if __name__ == "__main__":
         steps_per_env = args.total_timesteps // args.num_envs
         rollout_length = args.rollout_steps // args.num_envs
         num_iterations = math.ceil(steps_per_env / rollout_length)
-        progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps", global_step)
+        progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps", global_step, task.objectives)
 
         for iteration in range(first_iteration, num_iterations + 1):
             # ALGO Logic: Storage setup (the last rollout may be shorter)
@@ -249,6 +256,7 @@ if __name__ == "__main__":
             actions = torch.zeros((num_steps, args.num_envs), dtype=torch.long)
             logprobs = torch.zeros((num_steps, args.num_envs))
             rewards = torch.zeros((num_steps, args.num_envs, num_values))
+            weights = torch.zeros((num_steps, args.num_envs, task.num_objectives))
             dones = torch.zeros((num_steps, args.num_envs, 1))
             values = torch.zeros((num_steps, args.num_envs, num_values))
             rollout_start, env_seconds = time.perf_counter(), 0.0
@@ -256,7 +264,7 @@ if __name__ == "__main__":
             for step in range(num_steps):
                 global_step += args.num_envs
                 obs[step] = torch.from_numpy(next_obs)
-                masks[step] = torch.from_numpy(protocol.action_masks(envs, next_obs, args.env_id))
+                masks[step] = torch.from_numpy(task.action_masks(envs, next_obs))
                 dones[step] = torch.from_numpy(next_done)[:, None]
 
                 # ALGO LOGIC: action logic
@@ -267,7 +275,7 @@ if __name__ == "__main__":
                 logprobs[step] = logprob
 
                 # TRY NOT TO MODIFY: execute the game and log data.
-                preferences = next_obs[:, 0].astype(np.float64)
+                preferences = protocol.observed_weights(next_obs, task.num_objectives)
                 env_start = time.perf_counter()
                 next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
                 env_seconds += time.perf_counter() - env_start
@@ -275,26 +283,22 @@ if __name__ == "__main__":
                 episode_returns += reward
                 scaled = reward * args.reward_scales
                 if not args.per_objective_advantages:
-                    scaled = protocol.scalarize(scaled[:, :1], scaled[:, 1:], preferences[:, None])
+                    scaled = protocol.scalarize(scaled, preferences)[:, None]
                 rewards[step] = torch.from_numpy(scaled)
+                weights[step] = torch.from_numpy(preferences)
 
                 for i in np.flatnonzero(next_done):
                     episode += 1
-                    carbon, thaw = episode_returns[i]
-                    scalarized_return = protocol.scalarize(carbon, thaw, preferences[i])
                     row = {
                         "global_step": global_step,
                         "episode": episode,
                         "env": i,
-                        "preference": preferences[i],
-                        "carbon_return": carbon,
-                        "thaw_return": thaw,
-                        "scalarized_return": scalarized_return,
-                        **protocol.final_info(infos, i, ("site_seed", *protocol.EPISODE_INFO)),
+                        **task.returns_row(preferences[i], episode_returns[i]),
+                        **protocol.final_info(infos, i),
                     }
 
                     run.log("episodes", row)
-                    progress.returns.append((carbon, thaw))
+                    progress.returns.append(episode_returns[i].copy())
                     episode_returns[i] = 0
                 progress.show(global_step)
             run.time("environment", global_step, env_seconds)
@@ -320,7 +324,7 @@ if __name__ == "__main__":
 
             # Optimizing the policy and value network
             if args.per_objective_advantages:
-                b_advantages = weigh_advantages(b_advantages, b_obs[:, 0], b_inds)
+                b_advantages = weigh_advantages(b_advantages, weights.flatten(0, 1), b_inds)
             b_advantages = b_advantages.flatten()
             num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
             losses = []
@@ -372,13 +376,9 @@ if __name__ == "__main__":
             run.save(global_step, last=iteration == num_iterations, **state)
 
         envs.close()
-
-        def action_probabilities(observations, masks, accrued_returns):
-            with torch.no_grad():
-                distribution = agent.get_distribution(torch.from_numpy(observations), torch.from_numpy(masks))
-            return distribution.probs.numpy()
+        run.save_policy(agent, num_values=num_values)
 
         evaluation_start = time.perf_counter()
-        evaluation, years = protocol.evaluate(args, env_kwargs, action_probabilities)
+        evaluation, years = protocol.evaluate(task, make_policy(agent), args.eval_weights, args.eval_episodes)
         run.time("evaluation", global_step, time.perf_counter() - evaluation_start)
         run.finish(evaluation, years)

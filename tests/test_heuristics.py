@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 from scripts import run_script
 
-from baselines_heuristic import Args, conifer_restoration, plus_100, random_valid, target_density, zero_change
+from baselines_heuristic import conifer_restoration, plus_100, random_valid, target_density, zero_change
 from cleanrl_style import protocol
 from cleanrl_style.protocol import evaluation
 
@@ -58,7 +58,7 @@ def test_run_folder(script, tmp_path):
     names = {"config.json", "evaluation.csv", "evaluation_years.csv", "summary.png", "timing.csv"}
     assert {path.name for path in tmp_path.iterdir()} == names
     episodes = pd.read_csv(tmp_path / "evaluation.csv")
-    assert tuple(episodes.columns) == evaluation.EVALUATION_COLUMNS
+    assert tuple(episodes.columns) == evaluation.evaluation_columns(("carbon", "thaw"))
     assert episodes.groupby(["policy", "preference"]).size().tolist() == [2] * 6
     years = pd.read_csv(tmp_path / "evaluation_years.csv")
     assert years.groupby(["policy", "preference", "year", "variable"]).size().eq(1).all()
@@ -69,16 +69,16 @@ def test_one_simulation_stands_for_every_weight(tmp_path):
         "baselines_heuristic/target_density.py", "--run-dir", tmp_path, "--eval-episodes", 2, "--eval-weights", 0, 0.7
     )
     written = pd.read_csv(tmp_path / "evaluation.csv")
-    args = Args(eval_episodes=2, eval_weights=(0.0, 0.7))
     simulated, _ = protocol.evaluate(
-        args,
-        protocol.prepare(args),
+        protocol.Task.of("boreal-generalist-v0"),
         lambda observations, masks, returns: np.eye(25)[target_density.policy(observations, masks)],
+        (0.0, 0.7),
+        2,
     )
     pd.testing.assert_frame_equal(written, simulated, rtol=1e-8, check_dtype=False)
 
 
 def test_users_environments_are_refused(tmp_path):
-    with pytest.raises(SystemExit, match="--env-id must be one of"):
+    with pytest.raises(SystemExit, match="fixed strategies know the boreal environments alone"):
         run_script("baselines_heuristic/zero_change.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()

@@ -136,7 +136,7 @@ def test_gae_of_two_objectives_is_that_of_their_weighted_sum():
 def test_advantages_are_normalised_per_objective_then_weighed():
     # of the trained ones (0, 1): carbon 1, 3 has mean 2 and deviation 1; thaw 10, 50 has 30 and 20
     advantages = torch.tensor([[1.0, 10.0], [3.0, 50.0], [4.0, 50.0]])
-    weighed = weigh_advantages(advantages, torch.tensor([1.0, 0.25, 0.5]), np.array([0, 1]))
+    weighed = weigh_advantages(advantages, torch.tensor([[1.0, 0.0], [0.25, 0.75], [0.5, 0.5]]), np.array([0, 1]))
     torch.testing.assert_close(weighed, torch.tensor([-1.0, 1.0, 1.5]))
 
 
@@ -144,7 +144,8 @@ def test_advantages_are_normalised_per_objective_then_weighed():
 
 
 def make_curriculum(raw=False, seed=1, size=OBSERVATIONS, selector="network"):
-    return Curriculum(size, Args(seed=seed, raw_selector=raw, selector=selector))
+    task = SimpleNamespace(num_objectives=2, site_entries=range(43, size))
+    return Curriculum(task, Args(seed=seed, raw_selector=raw, selector=selector))
 
 
 def test_scores_are_centred_and_scaled_over_sampled_sites():
@@ -179,7 +180,9 @@ def test_without_site_observations_every_episode_is_accepted():
 
 def test_one_site_in_all_episodes_is_accepted(tmp_path):
     """This site scores below the threshold: the agent would never be trained."""
-    assert make_curriculum().score(boreal_env.sample_site_observations([2]))[0] < 0.5
+    observations = np.zeros((1, OBSERVATIONS), np.float32)
+    observations[:, -62:] = boreal_env.sample_site_observations([2])
+    assert make_curriculum().score(observations)[0] < 0.5
     run_script(
         SCRIPT,
         "--site-seed",
@@ -454,11 +457,11 @@ def test_learns_the_toy(tmp_path):
         (["--gamma", "1.1"], "--gamma must lie in [0, 1], not 1.1"),
         (["--mode", "site-specific", "--env-id", "boreal-generalist-v0"], "contradicts"),
         (["--mode", "generalist", "--env-id", "boreal_env:boreal-site-specific-v0"], "contradicts"),
-        (["--site-seed", "3", "--env-id", "toy_env:toy-v0"], "--site-seed is for boreal-generalist-v0, "),
+        (["--site-seed", "3", "--env-id", "toy_env:toy-v0"], "--site-seed is for boreal environments"),
         (["--thaw-formulation", "contrast", "--env-id", "toy_env:toy-v0"], "not for --env-id toy_env:toy-v0"),
         (["--vectorization", "lockstep", "--env-id", "toy_env:toy-v0"], "no vector entry point"),
         (["--reward-scales", "1", "-1"], "--reward-scales must lie in [0, 1000000], not -1"),
-        (["--hide-site", "--mode", "site-specific"], "--hide-site is for boreal-generalist-v0 and boreal-balanced-v0"),
+        (["--hide-site", "--mode", "site-specific"], "--env-id boreal-site-specific-v0 observes no site parameters"),
         (["--hide-site", "--env-id", "toy_env:toy-v0"], "--env-id toy_env:toy-v0 observes no site parameters"),
         (["--hide-site"], "--hide-site leaves --selector network nothing to score"),
         (["--selector", "coin", "--raw-selector"], "--raw-selector is for --selector network"),
@@ -496,7 +499,7 @@ def test_refusal_on_the_command_line(arguments, tmp_path):
 )
 def test_defaults_that_depend_on_others(given, env_id, mode, steps, envs):
     args = Args(**given)
-    protocol.resolve(args)
+    protocol.make_task(args)
     assert (args.env_id, args.mode, args.total_timesteps, args.num_envs) == (env_id, mode, steps, envs)
 
 

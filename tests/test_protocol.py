@@ -11,6 +11,8 @@ from cleanrl_style import protocol
 from cleanrl_style.protocol import evaluation, run_folder
 from cleanrl_style.protocol.progress import Progress
 
+EVALUATION_COLUMNS = evaluation.evaluation_columns(("carbon", "thaw"))
+
 
 @dataclass
 class Arguments:
@@ -20,7 +22,7 @@ class Arguments:
     env_id: str | None = "toy_env:toy-v0"
     mode: str | None = None
     site_seed: int | None = None
-    thaw_formulation: str = "asymmetric"
+    thaw_formulation: str | None = None
     eval_episodes: int = 3
     eval_weights: tuple = (0.0, 0.5, 1.0)
     run_dir: str | None = None
@@ -30,7 +32,8 @@ class Arguments:
 
 def evaluate(policy, **changes):
     args = Arguments(**changes)
-    return protocol.evaluate(args, protocol.prepare(args), policy)
+    task = protocol.make_task(args)
+    return protocol.evaluate(task, policy, args.eval_weights, args.eval_episodes)
 
 
 def optimal(observations, masks, accrued_returns):
@@ -51,7 +54,7 @@ def uniform(observations, masks, accrued_returns):
 def test_the_optimal_policy_earns_the_optimum():
     episodes, years = evaluate(optimal)
     assert years is None
-    assert tuple(episodes.columns) == evaluation.EVALUATION_COLUMNS
+    assert tuple(episodes.columns) == EVALUATION_COLUMNS
     assert len(episodes) == 2 * 3 * 3
     np.testing.assert_allclose(episodes.scalarized_return, episodes.preference.map(optimal_return), rtol=1e-6)
     np.testing.assert_allclose(
@@ -117,7 +120,7 @@ def test_statistics_of_the_annual_record():
     records = [
         {"year": np.array([1, 2]), "density": np.array([1.0, 2.0]) * k, "fraction": np.full(2, k)} for k in range(5)
     ]
-    table = evaluation.summarize_years("greedy", 0.5, records).set_index(["variable", "year"])
+    table = evaluation.summarize_years({"policy": "greedy", "preference": 0.5}, records).set_index(["variable", "year"])
     assert len(table) == 4
     row = table.loc[("density", 2)]
     assert (row["mean"], row.p50, row.p10, row.p90) == (4.0, 4.0, 0.8, 7.2)
@@ -152,8 +155,8 @@ def test_other_thaw_formulations_are_also_judged_by_the_asymmetric_one():
     given = dict(env_id="boreal-generalist-v0", eval_episodes=1, eval_weights=(0.5,))
     own, _ = evaluate(plus_100, **given)
     other, _ = evaluate(plus_100, thaw_formulation="contrast", **given)
-    assert tuple(own.columns) == evaluation.EVALUATION_COLUMNS
-    assert tuple(other.columns) == (*evaluation.EVALUATION_COLUMNS, evaluation.ASYMMETRIC)
+    assert tuple(own.columns) == EVALUATION_COLUMNS
+    assert tuple(other.columns) == (*EVALUATION_COLUMNS, evaluation.ASYMMETRIC)
     np.testing.assert_allclose(other.asymmetric_thaw_return, own.thaw_return, rtol=1e-6)
     assert not np.allclose(other.thaw_return, own.thaw_return)
 
@@ -163,8 +166,7 @@ def test_other_thaw_formulations_are_also_judged_by_the_asymmetric_one():
 
 def make_run(folder, overwrite=False, **changes):
     args = Arguments(run_dir=str(folder), overwrite=overwrite, **changes)
-    protocol.prepare(args)
-    return protocol.Run(args, "script", episodes=("step", "value"))
+    return protocol.Run(args, protocol.make_task(args), "script", episodes=("step", "value"))
 
 
 def test_rows_are_on_disk_at_once(tmp_path):
@@ -259,8 +261,7 @@ def test_folder_names_say_what_is_not_default(tmp_path, monkeypatch):
         ({"eval_weights": (0.0, 0.25)}, "toy-v0-eval_weights=0,0.25"),
     ]:
         args = Arguments(**changes)
-        protocol.prepare(args)
-        assert str(protocol.Run(args, "script").folder) == f"runs/script/{name}/seed1"
+        assert str(protocol.Run(args, protocol.make_task(args), "script").folder) == f"runs/script/{name}/seed1"
 
 
 def test_a_name_too_long_for_a_folder_ends_in_its_hash():
@@ -270,7 +271,7 @@ def test_a_name_too_long_for_a_folder_ends_in_its_hash():
 
 
 def test_progress_is_shown_at_once_and_at_the_end(capsys):
-    progress = Progress("training", 1000, "steps")
+    progress = Progress("training", 1000, "steps", objectives=("carbon", "thaw"))
     for done in range(1, 1001):
         progress.returns.append((1.0, -2.0))
         progress.show(done)

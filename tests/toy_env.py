@@ -122,3 +122,33 @@ gym.register("toy-sites-v0", entry_point="toy_env:ToyEnv", kwargs={"with_site": 
 gym.register("toy-centred-v0", entry_point="toy_env:ToyEnv", kwargs={"offset": 0.6})
 gym.register("loose-toy-v0", entry_point="toy_env:LooseToyEnv")
 gym.register("hopeless-toy-v0", entry_point="toy_env:HopelessToyEnv")
+
+
+class ThreeToyEnv(ToyEnv):
+    """Of three objectives: the mixture earns a third reward, most at one half. Observation: two weights first."""
+
+    objective_names = ("carbon", "thaw", "variety")
+
+    def __init__(self):
+        super().__init__()
+        self.observation_space = gym.spaces.Box(0, 1, (4,), np.float32)
+        self.reward_space = gym.spaces.Box(-2, 1, (3,), np.float32)
+        self.reward_dim = 3
+
+    def reset(self, *, seed=None, options=None):
+        weights = (options or {}).get("preference")
+        super().reset(seed=seed)
+        self.weights = self.np_random.dirichlet(np.ones(3)) if weights is None else np.asarray(weights)
+        return self._observation(), {}
+
+    def _observation(self):
+        weights = getattr(self, "weights", np.zeros(3))
+        return np.array([*weights[:2], self.steps / LENGTH, self.full], dtype=np.float32)
+
+    def step(self, action):
+        observation, reward, *rest = super().step(action)
+        mix = MIXES[action % 5]
+        return observation, np.append(reward, np.float32(4 * mix * (1 - mix))), *rest
+
+
+gym.register("toy-three-v0", entry_point="toy_env:ThreeToyEnv")

@@ -1,26 +1,39 @@
 """What every training script and heuristic shares, whatever its algorithm: the one import of the scripts.
 
-A script calls `prepare` (arguments), opens its `Run` (folder), trains on `run.make_envs()`, logs rows, saves
-checkpoints and shows `Progress` meanwhile, and ends with `evaluate` and `run.finish`.
+A script reads its arguments (`parse`), asks the environment what it is (`make_task`), opens its folder (`Run`), trains
+on `run.make_envs()`, logs rows, saves checkpoints and shows `Progress` meanwhile, and ends with `run.save_policy`,
+`evaluate` and `run.finish`. `load_agent` gives the policy of a finished run.
 """
 
-from cleanrl_style.protocol.arguments import LIMITS, MAX_ENVS, fail, not_default, parse, prepare, resolve  # noqa: F401
-from cleanrl_style.protocol.evaluation import (  # noqa: F401
-    EVAL_WEIGHTS,
-    FIRST_EVALUATION_SEED,
-    MODES,
-    POLICIES,
-    action_masks,
-    evaluate,
-    final_info,
-)
-from cleanrl_style.protocol.fronts import scalarize  # noqa: F401
-from cleanrl_style.protocol.progress import Progress  # noqa: F401
-from cleanrl_style.protocol.run_folder import (  # noqa: F401
-    EPISODE_COLUMNS,
-    EPISODE_INFO,
-    FLOAT_FORMAT,
-    TIMING_COLUMNS,
-    Run,
-    replacing,
-)
+from cleanrl_style.protocol.agents import load_agent
+from cleanrl_style.protocol.arguments import LIMITS, MAX_ENVS, fail, make_task, not_default, parse
+from cleanrl_style.protocol.evaluation import FIRST_EVALUATION_SEED, POLICIES, evaluate
+from cleanrl_style.protocol.files import replacing
+from cleanrl_style.protocol.fronts import scalarize
+from cleanrl_style.protocol.progress import Progress
+from cleanrl_style.protocol.run_folder import FLOAT_FORMAT, TIMING_COLUMNS, Run
+from cleanrl_style.protocol.task import EPISODE_INFO, Task, final_info
+from sim.task.preference import observed_weights
+
+__all__ = [
+    "EPISODE_INFO",
+    "FIRST_EVALUATION_SEED",
+    "FLOAT_FORMAT",
+    "LIMITS",
+    "MAX_ENVS",
+    "POLICIES",
+    "TIMING_COLUMNS",
+    "Progress",
+    "Run",
+    "Task",
+    "evaluate",
+    "fail",
+    "final_info",
+    "load_agent",
+    "make_task",
+    "not_default",
+    "observed_weights",
+    "parse",
+    "replacing",
+    "scalarize",
+]

@@ -1,15 +1,19 @@
 """The arguments that the training scripts and heuristics share: how they are read, filled in and checked."""
 
 import contextlib
+import dataclasses
 import importlib.util
 import io
 import sys
 
 import gymnasium as gym
+import numpy as np
 import tyro
 
 import boreal_env
-from cleanrl_style.protocol.evaluation import FIRST_EVALUATION_SEED, MODES, as_mask
+from cleanrl_style.protocol.evaluation import FIRST_EVALUATION_SEED
+from cleanrl_style.protocol.fronts import evaluation_weights
+from cleanrl_style.protocol.task import Task
 
 MAX_ENVS = 1000
 # Arguments that change nothing in what a run computes.
@@ -72,71 +76,45 @@ def parse(arguments: type):
     fail(" ".join(lines[: rules[0] if rules else None]) or errors.getvalue().strip())
 
 
-def resolve(args) -> None:
-    """Fill in, in place, the arguments whose default depends on another one."""
-    if args.env_id is None:
-        args.env_id = "boreal-site-specific-v0" if args.mode == "site-specific" else "boreal-generalist-v0"
-    args.env_id = args.env_id.removeprefix("boreal_env:")
-    if args.env_id not in MODES and args.env_id + "-v0" in MODES:
-        fail(f"--env-id {args.env_id}: give the version, {args.env_id}-v0")
-    if args.mode is None:
-        args.mode = MODES.get(args.env_id, "generalist")
-    if getattr(args, "total_timesteps", 0) is None:
-        args.total_timesteps = 100_000 if args.mode == "site-specific" else 300_000
-    if getattr(args, "num_envs", 0) is None:
-        args.num_envs = 32 if args.vectorization == "lockstep" else 8
-    if hasattr(args, "preference"):
-        args.eval_weights = (args.preference,)
+def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -> Task:
+    """The environment that the arguments name. Fills them in and checks them, in place, before a file is written.
 
-
-def not_default(args) -> dict:
-    """The arguments that make this another experiment than the script's default of the same environment."""
-    given = {name: getattr(args, name) for name in ("env_id", "mode", "vectorization") if hasattr(args, name)}
-    default = type(args)(**given)
-    resolve(default)
-    alike = {"seed", *FREE_ARGUMENTS} | ({"eval_weights"} if hasattr(args, "preference") else set())
-    changed = {
-        name: value for name, value in vars(args).items() if name not in alike and value != getattr(default, name)
-    }
-    if given.get("vectorization", "async") != "async":
-        changed["vectorization"] = args.vectorization
-    return changed
-
-
-def prepare(args) -> dict:
-    """Resolve and check all arguments, before anything is created; returns the environment's arguments.
-
+    preference : of every training episode, a number or weights; None has the environment draw one for each.
+    hide_site : whether its site parameters are left out of the observation. env_kwargs : more of its arguments.
     Exits with one line that names the bad value and what is allowed.
     """
-    resolve(args)
     for name, (low, high) in LIMITS.items():
         given = getattr(args, name, None)
-        for value in given if isinstance(given, tuple) else (given,):
-            if value is not None and not low <= value <= high:
+        for value in [] if given is None else np.ravel(given).tolist():
+            if not low <= value <= high:
                 fail(f"--{name.replace('_', '-')} must lie in [{low}, {high}], not {value}")
-    if not args.eval_weights or len(set(args.eval_weights)) < len(args.eval_weights):
-        fail("--eval-weights must name at least one weight, and none twice")
+    args.env_id = name_environment(args)
+    registered = ask(args.env_id)  # as it is without the flags
+    fill_in(args, registered)
 
-    boreal = args.env_id in MODES
-    if boreal and args.mode != MODES[args.env_id]:
-        fail(f"--mode {args.mode} contradicts --env-id {args.env_id}, which is {MODES[args.env_id]}")
-    if not boreal and (args.mode != "generalist" or args.thaw_formulation != "asymmetric"):
-        fail(f"--mode and --thaw-formulation are for {', '.join(MODES)}, not for --env-id {args.env_id}")
-    if not boreal and args.site_seed is not None:
-        fail(f"--site-seed is for {', '.join(MODES)}, not for --env-id {args.env_id}")
-    env_kwargs = {"thaw_formulation": args.thaw_formulation} if boreal else {}
-    if args.site_seed is not None:
-        env_kwargs["site_seed"] = args.site_seed
-    if getattr(args, "hide_site", False):
-        if not boreal or args.mode == "site-specific":
-            generalist = " and ".join(name for name, mode in MODES.items() if mode == "generalist")
-            fail(f"--hide-site is for {generalist}: --env-id {args.env_id} observes no site parameters")
+    if args.mode != registered.mode:
+        fail(f"--mode {args.mode} contradicts --env-id {args.env_id}, which is {registered.mode}")
+    given = {"thaw_formulation": args.thaw_formulation, "site_seed": args.site_seed}
+    flags = {name: value for name, value in given.items() if value != getattr(registered, name, None)}
+    for name in flags if not registered.boreal else ():
+        fail(f"--{name.replace('_', '-')} is for boreal environments, not for --env-id {args.env_id}")
+    env_kwargs |= flags
+    if hide_site:
         env_kwargs["observation_groups"] = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
-    if boreal and hasattr(args, "preference"):
-        env_kwargs["fixed_preference"] = args.preference
-    if not boreal and hasattr(args, "preference") and args.vectorization == "lockstep":
-        fail(f"--vectorization lockstep: only {', '.join(MODES)} can keep a --preference so; async has no need of it")
+        if not registered.boreal or not registered.site_entries:
+            fail(f"--hide-site: --env-id {args.env_id} observes no site parameters")
+    task = ask(args.env_id, **env_kwargs)
+    if preference is not None:
+        task = _checked("--preference", task.with_preference, preference)
+    lockstep = getattr(args, "vectorization", "async") == "lockstep"
+    if lockstep and not task.has_lockstep:
+        fail(f"--vectorization lockstep: {args.env_id} has no vector entry point; async has no need of one")
+    if lockstep and preference is not None and not task.boreal:
+        fail(f"--vectorization lockstep: --env-id {args.env_id} cannot keep a --preference so; async has no need of it")
 
+    weights = [tuple(_checked("--eval-weights", task.check_weights, value)) for value in args.eval_weights]
+    if not weights or len(set(weights)) < len(weights):
+        fail("--eval-weights must name at least one weight, and none twice")
     if hasattr(args, "rollout_steps") and args.rollout_steps % args.num_envs:
         fail(
             f"--rollout-steps {args.rollout_steps}, a sum over all environments, must be a multiple of "
@@ -147,33 +125,69 @@ def prepare(args) -> dict:
     for package in getattr(args, "track", ()):
         if importlib.util.find_spec(package) is None:
             fail(f"--track {package}: the package is not installed (pip install {package})")
-    check_environment(args, env_kwargs)
-    return env_kwargs
+    return task
 
 
-def check_environment(args, env_kwargs: dict) -> None:
-    """Exit with one line unless the environment exists and is of the kind that the scripts can handle."""
-    allowed = f"allowed: {', '.join(MODES)}, or module:id of an environment of yours"
-    if args.env_id.count(":") > 1 or not all(args.env_id.split(":")):
-        fail(f"--env-id {args.env_id!r}; {allowed}")
+def name_environment(args) -> str:
+    """The environment's id: that of --env-id, or of the mode."""
+    if args.env_id is None:
+        return "boreal-site-specific-v0" if args.mode == "site-specific" else "boreal-generalist-v0"
+    env_id = args.env_id.removeprefix("boreal_env:")
+    if env_id not in gym.registry and f"{env_id}-v0" in gym.registry:
+        fail(f"--env-id {env_id}: give the version, {env_id}-v0")
+    return env_id
+
+
+def ask(env_id: str, **env_kwargs) -> Task:
+    """The environment's answers; exits with one line if there is none, or one that the scripts cannot handle."""
+    ours = ", ".join(name for name in gym.registry if name.startswith("boreal-"))
+    allowed = f"allowed: {ours}, or module:id of an environment of yours"
+    if env_id.count(":") > 1 or not all(env_id.split(":")):
+        fail(f"--env-id {env_id!r}; {allowed}")
     try:
-        env = gym.make(args.env_id, disable_env_checker=True, **env_kwargs)
+        return Task.of(env_id, **env_kwargs)
     except (gym.error.Error, ModuleNotFoundError) as error:
-        fail(f"--env-id {args.env_id}: {str(error).splitlines()[0]}; {allowed}")
-    space, actions = env.observation_space, env.action_space
-    if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
-        fail(f"--env-id {args.env_id}: observations must be a Box of one dimension, not {space}")
-    if not isinstance(actions, gym.spaces.Discrete) or actions.n != 25:
-        fail(f"--env-id {args.env_id}: actions must be Discrete(25), not {actions}")
-    if getattr(env.unwrapped, "reward_dim", None) != 2 or not hasattr(env.unwrapped, "action_masks"):
-        fail(f"--env-id {args.env_id}: the environment needs reward_dim 2 and action_masks()")
-    if args.env_id not in MODES:
-        if env.reset(seed=0, options={"preference": 0.25})[0][0] != 0.25:
-            fail(f"--env-id {args.env_id}: reset(options={{'preference': w}}) must give w as observation 0")
-        try:
-            as_mask(env.unwrapped.action_masks(), args.env_id)
-        except ValueError as error:
-            fail(str(error))
-    if getattr(args, "vectorization", "async") == "lockstep" and env.spec.vector_entry_point is None:
-        fail(f"--vectorization lockstep: {args.env_id} has no vector entry point; async has no need of one")
-    env.close()
+        fail(f"--env-id {env_id}: {str(error).splitlines()[0]}; {allowed}")
+    except ValueError as error:
+        fail(f"--env-id {env_id}: {error}")
+
+
+def fill_in(args, registered: Task) -> None:
+    """Set, in place, the arguments that were left to others; registered : the environment without the flags."""
+    if args.mode is None:
+        args.mode = registered.mode
+    if args.thaw_formulation is None:
+        args.thaw_formulation = registered.thaw_formulation
+    if getattr(args, "total_timesteps", 0) is None:
+        args.total_timesteps = 100_000 if args.mode == "site-specific" else 300_000
+    if getattr(args, "num_envs", 0) is None:
+        args.num_envs = 32 if args.vectorization == "lockstep" else 8
+    number = registered.num_objectives
+    if getattr(args, "reward_scales", ()) is None:
+        args.reward_scales = (1.0,) * number
+    if getattr(args, "eval_weights", ()) is None:
+        args.eval_weights = evaluation_weights(number)
+    elif number != 2 and hasattr(args, "eval_weights") and np.ndim(args.eval_weights) == 1:
+        if len(args.eval_weights) % number:
+            fail(f"--eval-weights: {number} numbers a weight, not {len(args.eval_weights)} in all")
+        args.eval_weights = tuple(map(tuple, np.reshape(args.eval_weights, (-1, number)).tolist()))
+
+
+def not_default(args) -> dict:
+    """The arguments that make this another experiment than the script's default of the same environment."""
+    given = {name: getattr(args, name) for name in ("env_id", "mode", "vectorization") if hasattr(args, name)}
+    default = type(args)(**given)
+    fill_in(default, ask(args.env_id))
+    names = [field.name for field in dataclasses.fields(args) if field.name not in ("seed", *FREE_ARGUMENTS)]
+    changed = {name: getattr(args, name) for name in names if getattr(args, name) != getattr(default, name)}
+    if given.get("vectorization", "async") != "async":
+        changed["vectorization"] = args.vectorization
+    return changed
+
+
+def _checked(flag: str, check, value):
+    """check(value), whose ValueError ends the script, under the flag's name."""
+    try:
+        return check(value)
+    except ValueError as error:
+        fail(f"{flag}: {str(error).removeprefix('preference: ')}")

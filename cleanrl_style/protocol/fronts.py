@@ -1,34 +1,85 @@
-"""Fronts of a multi-objective policy: scalarised returns, hypervolume, sparsity, expected utility.
+"""Weights, returns and fronts, for any number of objectives m: what a run's tables call them, and what they are worth.
 
-Every objective is maximised; a set of points is an array (n, 2) of [carbon, thaw].
+Objectives are maximised. Weights lie on the simplex: m numbers that sum to 1. Of two objectives, tables and flags name
+one weight, the first objective's, as `preference`; of more, one an objective.
 """
 
-import moocore
+import itertools
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 import pandas as pd
 
-OBJECTIVES = ["carbon_return", "thaw_return"]
-REFERENCE_POINT = (-2.0, -2.0)
+REFERENCE_POINT = -2.0  # of every objective, in hypervolumes
+UTILITY_WEIGHTS = 50  # of two objectives, in expected utilities; of more, the lattice with no fewer
+
+# ------------------------------------------------------------------------------------- names of a table's columns
 
 
-def scalarize(carbon, thaw, preference):
-    """Scalarised return w_C carbon + (1 - w_C) thaw [-]; scalars or arrays of one shape."""
-    return preference * carbon + (1 - preference) * thaw
+def weight_columns(objectives: Sequence[str]) -> list[str]:
+    """Columns of the weights: `preference` of two objectives, else weight_<objective> of each."""
+    return ["preference"] if len(objectives) == 2 else [f"weight_{name}" for name in objectives]
 
 
-def mean_returns(evaluation: pd.DataFrame) -> pd.DataFrame:
-    """Mean of both returns over the episodes of each weight; index: the weights in ascending order."""
-    return evaluation.groupby("preference")[OBJECTIVES].mean().sort_index()
+def return_columns(objectives: Sequence[str]) -> list[str]:
+    """Columns of the returns, in order."""
+    return [f"{name}_return" for name in objectives]
+
+
+def objectives_of(columns: Iterable[str]) -> list[str]:
+    """Objectives of a table of episodes, from its columns: those of returns, before `scalarized_return`."""
+    own = itertools.takewhile(lambda name: name != "scalarized_return", columns)
+    return [name.removesuffix("_return") for name in own if name.endswith("_return")]
+
+
+def weights_of(table: pd.DataFrame) -> np.ndarray:
+    """Weights of a table of episodes, (n, m)."""
+    weights = table[weight_columns(objectives_of(table.columns))].to_numpy(dtype=float)
+    return np.hstack([weights, 1 - weights]) if weights.shape[1] == 1 else weights
+
+
+def returns_of(table: pd.DataFrame) -> np.ndarray:
+    """Returns of a table of episodes, (n, m)."""
+    return table[return_columns(objectives_of(table.columns))].to_numpy(dtype=float)
+
+
+# ------------------------------------------------------------------------------------------------------- weights
+
+
+def scalarize(returns, weights):
+    """Scalarised returns (...), the dot product of returns (..., m) and weights (..., m); arrays or tensors."""
+    return (weights * returns).sum(-1)
+
+
+def simplex_lattice(number: int, divisions: int) -> np.ndarray:
+    """All weights of `number` objectives that are multiples of 1 / divisions; the first objective's ascends."""
+    steps = [c for c in itertools.product(range(divisions + 1), repeat=number) if sum(c) == divisions]
+    return np.array(steps) / divisions
+
+
+def evaluation_weights(number: int) -> tuple:
+    """Weights of an evaluation: 11 for two objectives, as their first; 15 for three, 20 for four, each as a tuple."""
+    if number == 2:
+        return tuple(i / 10 for i in range(11))
+    return tuple(map(tuple, simplex_lattice(number, {3: 4, 4: 3}.get(number, 2)).tolist()))
+
+
+# -------------------------------------------------------------------------------------------------------- fronts
 
 
 def nondominated(points: np.ndarray) -> np.ndarray:
-    """The points that no other point dominates, (k, 2), without duplicates."""
+    """The points that no other point dominates, (k, m), without duplicates."""
+    import moocore
+
     return moocore.filter_dominated(np.asarray(points, dtype=float), maximise=True)
 
 
-def hypervolume(points: np.ndarray, reference: tuple[float, float] = REFERENCE_POINT) -> float:
-    """Area dominated by the points above the reference point (points not above it in both add nothing)."""
-    return float(moocore.hypervolume(np.asarray(points, dtype=float), ref=list(reference), maximise=True))
+def hypervolume(points: np.ndarray, reference: float | Sequence[float] = REFERENCE_POINT) -> float:
+    """Volume that points (n, m) dominate above the reference point (one not above it in every objective adds none)."""
+    import moocore
+
+    points = np.asarray(points, dtype=float)
+    return float(moocore.hypervolume(points, ref=np.broadcast_to(reference, points.shape[1]).tolist(), maximise=True))
 
 
 def sparsity(points: np.ndarray) -> float:
@@ -43,11 +94,19 @@ def sparsity(points: np.ndarray) -> float:
     return float((gaps**2).sum() / (len(front) - 1))
 
 
-def expected_utility(points: np.ndarray, n_weights: int = 50) -> float:
-    """Mean over equally spaced weights of the best scalarised point (Zintgraf et al. 2015)."""
-    weights = np.linspace(0, 1, n_weights)
-    utilities = np.stack([weights, 1 - weights], axis=1) @ np.asarray(points, dtype=float).T
-    return float(utilities.max(axis=1).mean())
+def expected_utility(points: np.ndarray, n_weights: int = UTILITY_WEIGHTS) -> float:
+    """Mean over evenly spread weights of the best scalarised point (Zintgraf et al. 2015).
+
+    n_weights : of two objectives; of more, the coarsest lattice with at least as many.
+    """
+    points = np.asarray(points, dtype=float)
+    if points.shape[1] == 2:
+        first = np.linspace(0, 1, n_weights)
+        weights = np.stack([first, 1 - first], axis=1)
+    else:
+        lattices = (simplex_lattice(points.shape[1], divisions) for divisions in itertools.count(1))
+        weights = next(lattice for lattice in lattices if len(lattice) >= n_weights)
+    return float((weights @ points.T).max(axis=1).mean())
 
 
 def cardinality(points: np.ndarray) -> int:

@@ -11,11 +11,12 @@ import numpy as np
 class Progress:
     """One line that says how far a job is: rewritten in place on a terminal, else one every ten seconds.
 
-    `returns` holds the [carbon, thaw] returns of the last episodes, whose mean the line shows.
+    `returns` holds the last episodes' returns in the `objectives`, whose means the line shows.
     """
 
-    def __init__(self, label: str, total: int, unit: str, done: int = 0):
+    def __init__(self, label: str, total: int, unit: str, done: int = 0, objectives=()):
         """done: what an earlier process has done of it."""
+        self.objectives = objectives
         self.label, self.total, self.unit, self.done_before = label, total, unit, done
         self.terminal = sys.stdout.isatty()
         self.interval = 0.5 if self.terminal else 10.0
@@ -36,8 +37,8 @@ class Progress:
             f"{(self.total - done) / rate / 60:.1f} min left"
         )
         if self.returns:
-            carbon, thaw = np.mean(self.returns, axis=0)
-            line += f", carbon {carbon:+.2f}, thaw {thaw:+.2f}"
+            means = zip(self.objectives, np.mean(self.returns, axis=0), strict=True)
+            line += "".join(f", {name} {mean:+.2f}" for name, mean in means)
         if self.terminal:
             width = shutil.get_terminal_size().columns - 1
             print("\r" + line[:width].ljust(width), end="\n" if last else "", flush=True)

@@ -6,7 +6,6 @@ import hashlib
 import importlib.metadata
 import io
 import json
-import os
 import pickle
 import platform
 import random
@@ -24,46 +23,30 @@ import pandas as pd
 
 from cleanrl_style.protocol import tracking, training_envs
 from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, fail, not_default
+from cleanrl_style.protocol.files import replacing
 from cleanrl_style.protocol.summary import draw_summary, print_table
+from cleanrl_style.protocol.task import Task
 
 try:
     import fcntl
 except ImportError:  # Windows, where a folder is not locked
     fcntl = None
 
-EPISODE_INFO = ("final_density", "mean_density", "final_conifer_fraction", "mean_conifer_fraction")
-EPISODE_COLUMNS = (
-    "global_step",
-    "episode",
-    "env",
-    "site_seed",
-    "preference",
-    "carbon_return",
-    "thaw_return",
-    "scalarized_return",
-    *EPISODE_INFO,
-)
 TIMING_COLUMNS = ("phase", "global_step", "seconds", "elapsed_seconds")
 # What a run makes, but for config.json and timing.csv. The first of them makes it a finished run.
-RESULTS = ("evaluation.csv", "checkpoint.pt", "episodes.csv", "updates.csv", "evaluation_years.csv", "summary.png")
+RESULTS = (
+    "evaluation.csv",
+    "checkpoint.pt",
+    "policy.pt",
+    "episodes.csv",
+    "updates.csv",
+    "evaluation_years.csv",
+    "summary.png",
+)
 # Steps between checkpoints, at least: counted in steps, since by the clock the last one would differ each time.
 CHECKPOINT_STEPS = 2048
 FLOAT_FORMAT = "%.9g"
 LONGEST_NAME = 200  # bytes of a folder's name; file systems allow 255
-
-
-@contextlib.contextmanager
-def replacing(path: Path):
-    """A binary file that takes the place of `path` when the block ends: nobody ever sees half of it."""
-    temporary = path.with_name(path.name + ".tmp")
-    try:
-        with open(temporary, "wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 class Table:
@@ -104,8 +87,8 @@ class Run:
     another run's, in use, damaged or not writable, or holds this run finished (exit 0).
     """
 
-    def __init__(self, args, script: str, **tables):
-        self.args, self.script = args, script
+    def __init__(self, args, task: Task, script: str, **tables):
+        self.args, self.task, self.script = args, task, script
         changed = not_default(args)
         self.folder = Path(args.run_dir or Path("runs", script, folder_name(args.env_id, changed), f"seed{args.seed}"))
         self.config = {
@@ -251,9 +234,10 @@ class Run:
 
     # ------------------------------------------------------------------------------------------- while it runs
 
-    def make_envs(self, env_kwargs: dict):
-        """The vector environment to train on, which ends with the run."""
-        self.envs = training_envs.make_training_envs(self.args, env_kwargs)
+    def make_envs(self, **env_kwargs):
+        """The vector environment to train on, which ends with the run; env_kwargs : what the evaluation's lack."""
+        args = self.args
+        self.envs = training_envs.make_training_envs(self.task, args.num_envs, args.vectorization, **env_kwargs)
         return self.envs
 
     def log(self, table: str, row: dict) -> None:
@@ -275,6 +259,16 @@ class Run:
                 }
             )
 
+    def save_policy(self, agent, **arguments) -> None:
+        """Write policy.pt, weights alone: what `load_agent` makes the agent of. arguments : the Agent's own."""
+        import torch
+
+        buffer = io.BytesIO()
+        shape = self.envs.single_observation_space.shape
+        torch.save({"agent": agent.state_dict(), "arguments": arguments, "observation_shape": shape}, buffer)
+        with self._writing(), replacing(self.folder / "policy.pt") as file:
+            file.write(buffer.getvalue())
+
     def finish(self, evaluation: pd.DataFrame, years: pd.DataFrame | None) -> None:
         """Write the evaluation and the picture, print the table, and so declare the run finished."""
         with self._writing():
@@ -283,10 +277,10 @@ class Run:
                     years.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
             with replacing(self.folder / "summary.png") as file:
                 title = f"{self.script}, {self.args.env_id}, seed {self.args.seed}"
-                draw_summary(file, title, evaluation, years, self.folder / "episodes.csv")
+                draw_summary(file, title, self.task.objectives, evaluation, years, self.folder / "episodes.csv")
             with replacing(self.folder / "evaluation.csv") as file:
                 evaluation.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
-        print_table(evaluation)
+        print_table(self.task.objectives, evaluation)
         print(f"{self.folder}: finished in {time.perf_counter() - self.start:.0f} s")
 
     @contextlib.contextmanager
@@ -362,7 +356,7 @@ def differences(there: dict, here: dict) -> str:
 def folder_name(env_id: str, changed: dict) -> str:
     """Environment and name=value of what is not default; the end of a name too long for file systems is its hash."""
     values = {
-        name: ",".join(f"{v:g}" for v in value) if isinstance(value, tuple) else value
+        name: ",".join(f"{v:g}" for v in np.ravel(value)) if isinstance(value, tuple) else value
         for name, value in changed.items()
     }
     name = "-".join([env_id.split(":")[-1].replace("/", "-"), *(f"{k}={v}" for k, v in values.items())])

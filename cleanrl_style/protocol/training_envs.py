@@ -10,8 +10,8 @@ from functools import partial
 import gymnasium as gym
 import numpy as np
 
-from cleanrl_style.protocol.arguments import fail
-from cleanrl_style.protocol.evaluation import MODES
+import boreal_env
+from cleanrl_style.protocol.task import Task, as_option
 
 
 class InWorker(gym.Wrapper):
@@ -21,7 +21,7 @@ class InWorker(gym.Wrapper):
     hang if the error cannot be pickled. Numbers that are not finite are an error.
     """
 
-    def __init__(self, env: gym.Env, index: int, preference: float | None = None):
+    def __init__(self, env: gym.Env, index: int, preference=None):
         super().__init__(env)
         self.index, self.preference = index, preference
 
@@ -69,23 +69,30 @@ def end_process(index: int) -> None:
     os._exit(1)
 
 
-def make_env(env_id: str, index: int, preference: float | None, env_kwargs: dict) -> gym.Env:
+def make_env(task: Task, index: int, env_kwargs: dict) -> gym.Env:
     """One environment of an AsyncVectorEnv."""
     try:
-        return InWorker(gym.make(env_id, disable_env_checker=True, **env_kwargs), index, preference)
+        option = None if task.preference is None or task.boreal else as_option(task.preference)
+        return InWorker(task.make(**env_kwargs), index, option)
     except Exception:
         if multiprocessing.parent_process() is None:  # AsyncVectorEnv makes one more to look at its spaces
             raise
         end_process(index)
 
 
-def make_training_envs(args, env_kwargs: dict) -> gym.vector.VectorEnv:
-    """args.num_envs environments, each in a process or all in lockstep; episodes restart within the step."""
-    if args.vectorization == "lockstep":
-        return gym.make_vec(args.env_id, num_envs=args.num_envs, **env_kwargs)
-    # boreal environments are told their preference by env_kwargs
-    preference = None if args.env_id in MODES else getattr(args, "preference", None)
-    make = [partial(make_env, args.env_id, i, preference, env_kwargs) for i in range(args.num_envs)]
+def make_training_envs(task: Task, num_envs: int, vectorization: str, **env_kwargs) -> gym.vector.VectorEnv:
+    """Environments, each in a process ("async") or all in "lockstep"; episodes restart within the step.
+
+    env_kwargs : arguments of theirs that the evaluation's do not have.
+    """
+    if task.boreal:
+        if task.preference is not None:
+            env_kwargs["fixed_preference"] = as_option(task.preference)
+        print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
+        boreal_env.warm_up(num_envs if vectorization == "lockstep" else 1)  # before workers are forked
+    if vectorization == "lockstep":
+        return task.make_lockstep(num_envs, **env_kwargs)
+    make = [partial(make_env, task, i, env_kwargs) for i in range(num_envs)]
     # Ctrl-C reaches all processes of a terminal: the workers leave it to the main one, which then ends them
     handlers = {
         number: signal.signal(number, handler)
@@ -94,7 +101,7 @@ def make_training_envs(args, env_kwargs: dict) -> gym.vector.VectorEnv:
     try:
         return gym.vector.AsyncVectorEnv(make, autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
     except (EOFError, ConnectionError):
-        fail("an environment could not be made: its error is above")
+        sys.exit("error: an environment could not be made: its error is above")
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)

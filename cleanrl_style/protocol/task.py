@@ -1,0 +1,160 @@
+"""The environment that a run is about: what it is, and what it can do. It is asked; no list of ids is kept."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import gymnasium as gym
+import numpy as np
+
+import boreal_env
+from cleanrl_style.protocol.fronts import return_columns, scalarize, weight_columns
+from sim.task.preference import check_weights
+
+# What a boreal environment reports of an episode at its end.
+EPISODE_INFO = ("final_density", "mean_density", "final_conifer_fraction", "mean_conifer_fraction")
+
+
+@dataclass(frozen=True)
+class Task:
+    """An environment's id and arguments, and what it says of itself; make one by `Task.of`."""
+
+    env_id: str
+    env_kwargs: dict  # arguments beside those that it was registered with
+    objectives: tuple[str, ...]
+    mode: str = "generalist"  # or "site-specific": the same site and weather in every episode
+    thaw_formulation: str = "asymmetric"
+    years: int | None = None  # steps of an episode; None if it does not say
+    boreal: bool = False  # ours, by whatever id: compiled physics, an annual record, a preference that can be fixed
+    has_lockstep: bool = False
+    masks: Callable | None = None  # valid actions as a function of observations; None: the environment is called
+    site_entries: tuple[int, ...] = ()  # entries of the observation that are site parameters
+    preference: np.ndarray | None = field(default=None, compare=False)  # of every training episode; None: drawn
+
+    @staticmethod
+    def of(env_id: str, **env_kwargs) -> "Task":
+        """Ask the environment. Raises what making it raises, ValueError for one that the scripts cannot handle."""
+        env = gym.make(env_id, disable_env_checker=True, **env_kwargs)
+        one = env.unwrapped
+        objectives = _check_spaces(env)
+        boreal = isinstance(one, boreal_env.BorealEnv)
+        names = getattr(one, "observation_names", ())
+        if len(env.observation_space.low) == len(boreal_env.OBSERVATION_NAMES):
+            names = names or boreal_env.OBSERVATION_NAMES  # laid out like ours, so its last entries are a site
+        task = Task(
+            env_id=env_id,
+            env_kwargs=env_kwargs,
+            objectives=objectives,
+            mode=getattr(one, "mode", "generalist").replace("_", "-"),
+            thaw_formulation=getattr(one, "thaw_formulation", "asymmetric"),
+            years=getattr(one, "years", None),
+            boreal=boreal,
+            has_lockstep=env.spec.vector_entry_point is not None or type(one) is boreal_env.BorealEnv,
+            masks=one.mask_function() if boreal else None,
+            site_entries=tuple(i for i, name in enumerate(names) if name.startswith("site_")),
+        )
+        if not boreal:
+            task._check_behaviour(env)
+        env.close()
+        return task
+
+    def _check_behaviour(self, env: gym.Env) -> None:
+        """Refuse a user's environment that does not observe its preference, or has no valid action."""
+        weights = 2.0 ** -np.arange(1, len(self.objectives) + 1)  # exact in float32
+        weights[-1] = 1 - weights[:-1].sum()
+        weights = np.array([0.25, 0.75]) if len(weights) == 2 else weights
+        seen = env.reset(seed=0, options={"preference": as_option(weights)})[0][: len(weights) - 1]
+        if not np.array_equal(seen, weights[:-1]):
+            entries = "observation 0" if len(weights) == 2 else f"observations 0 to {len(weights) - 2}"
+            raise ValueError(f"reset(options={{'preference': w}}) must give w as {entries}")
+        as_mask(env.unwrapped.action_masks())
+
+    @property
+    def num_objectives(self) -> int:
+        """m, the length of its reward."""
+        return len(self.objectives)
+
+    @cached_property
+    def episode_columns(self) -> tuple[str, ...]:
+        """Columns of episodes.csv."""
+        scores = (*return_columns(self.objectives), "scalarized_return")
+        return ("global_step", "episode", "env", "site_seed", *weight_columns(self.objectives), *scores, *EPISODE_INFO)
+
+    def weights_row(self, weights: np.ndarray) -> dict:
+        """A table's columns of weights (m,)."""
+        return dict(zip(weight_columns(self.objectives), weights, strict=self.num_objectives != 2))
+
+    def returns_row(self, weights: np.ndarray, returns: np.ndarray) -> dict:
+        """A table's columns of weights (m,), returns (m,) and scalarised return."""
+        columns = dict(zip(return_columns(self.objectives), returns, strict=True))
+        return {**self.weights_row(weights), **columns, "scalarized_return": scalarize(returns, weights)}
+
+    def check_weights(self, value) -> np.ndarray:
+        """Weights (m,) of a preference as flags give it; ValueError names what is allowed."""
+        return check_weights(value, self.num_objectives)
+
+    def with_preference(self, value) -> "Task":
+        """The same, with one preference in every training episode."""
+        return replace(self, preference=self.check_weights(value))
+
+    def action_masks(self, envs: gym.vector.VectorEnv, observations: np.ndarray) -> np.ndarray:
+        """Valid actions, bool (n, 25): by the observations if they say it, else by calling every environment."""
+        if self.masks is not None:
+            return self.masks(observations)
+        return np.stack([as_mask(answer) for answer in envs.call("action_masks")])
+
+    def make(self, **kwargs) -> gym.Env:
+        """One environment."""
+        return gym.make(self.env_id, disable_env_checker=True, **self.env_kwargs, **kwargs)
+
+    def make_lockstep(self, num_envs: int, **kwargs) -> gym.vector.VectorEnv:
+        """Environments in lockstep, of a task that `has_lockstep`."""
+        kwargs = {**self.env_kwargs, **kwargs}
+        if gym.spec(self.env_id.split(":")[-1]).vector_entry_point is not None:
+            return gym.make_vec(self.env_id, num_envs=num_envs, **kwargs)
+        return gym.make(self.env_id, disable_env_checker=True).unwrapped.lockstep(num_envs, **kwargs)
+
+
+def as_option(weights: np.ndarray):
+    """Weights (..., m) as an environment's reset takes them: of two objectives, the first's alone."""
+    return weights[..., 0] if weights.shape[-1] == 2 else weights
+
+
+def as_mask(answer) -> np.ndarray:
+    """What an environment's action_masks() gave, as bool (25,); ValueError if no action is valid."""
+    mask = np.asarray(answer).astype(bool)
+    if mask.shape != (25,) or not mask.any():
+        raise ValueError(
+            f"action_masks() must give 25 values, at least one of them true, "
+            f"not {np.array2string(np.asarray(answer), threshold=30)}"
+        )
+    return mask
+
+
+def final_info(infos: dict, i: int, keys=("site_seed", *EPISODE_INFO)) -> dict:
+    """What environment i reported under these keys at its episode's end (gymnasium's SAME_STEP layout)."""
+
+    def of_one(values):
+        if isinstance(values, dict):
+            return {key: of_one(value) for key, value in values.items() if not key.startswith("_")}
+        return values[i]
+
+    info = infos.get("final_info", {})
+    return {key: of_one(info[key]) for key in keys if key in info}
+
+
+def _check_spaces(env: gym.Env) -> tuple[str, ...]:
+    """The environment's objectives; ValueError if its spaces are not those that the scripts know."""
+    space, actions, one = env.observation_space, env.action_space, env.unwrapped
+    if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
+        raise ValueError(f"observations must be a Box of one dimension, not {space}")
+    if not isinstance(actions, gym.spaces.Discrete) or actions.n != 25:
+        raise ValueError(f"actions must be Discrete(25), not {actions}")
+    number = getattr(one, "reward_dim", None)
+    if not isinstance(number, (int, np.integer)) or number < 2 or not hasattr(one, "action_masks"):
+        raise ValueError("the environment needs reward_dim, 2 or more, and action_masks()")
+    unnamed = ("carbon", "thaw") if number == 2 else tuple(f"objective_{k}" for k in range(1, number + 1))
+    names = tuple(getattr(one, "objective_names", unnamed))
+    if len(names) != number or len(set(names)) < number:
+        raise ValueError(f"objective_names must be {number} different names, not {names}")
+    return names

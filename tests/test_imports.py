@@ -1,0 +1,68 @@
+"""The house: analysis reads what runs leave and nothing needs it; no two files import each other; lazy libraries."""
+
+import ast
+import subprocess
+import sys
+
+import pytest
+from scripts import ROOT
+
+PACKAGES = ("sim", "cleanrl_style", "baselines_heuristic", "analysis")
+FILES = sorted([ROOT / "boreal_env.py", *(path for name in PACKAGES for path in (ROOT / name).rglob("*.py"))])
+
+
+def module_name(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_name(path): path for path in FILES}
+
+
+def imported(path):
+    """Modules of ours that a file imports, wherever in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: imports are absolute"
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= names & MODULES.keys() or {node.module}
+    return found & MODULES.keys() - {module_name(path)}
+
+
+GRAPH = {name: imported(path) for name, path in MODULES.items()}
+
+
+def reachable(name, seen=()):
+    """All that a module imports, and what that imports."""
+    found, waiting = set(), [name]
+    while waiting:
+        for other in GRAPH[waiting.pop()] - found:
+            found.add(other)
+            waiting.append(other)
+    return found
+
+
+def test_nothing_but_analysis_imports_analysis():
+    users = {name for name, targets in GRAPH.items() if any(target.split(".")[0] == "analysis" for target in targets)}
+    assert {name.split(".")[0] for name in users} == {"analysis"}
+
+
+def test_no_two_files_import_each_other():
+    circles = [name for name in GRAPH if name in reachable(name)]
+    assert circles == []
+
+
+def test_the_simulator_knows_neither_task_nor_training():
+    simulator = {name for name in GRAPH if name.split(".")[0] == "sim" and not name.startswith("sim.task")}
+    assert len(simulator) > 20
+    assert all(reachable(name) <= simulator for name in simulator)
+
+
+@pytest.mark.parametrize("module", ["boreal_env", "cleanrl_style.protocol", "baselines_heuristic"])
+def test_pictures_and_fronts_are_imported_when_they_are_made(module):
+    code = f"import sys, {module}; print(*sys.modules)"
+    names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    assert not {"matplotlib", "moocore", "torch"} & set(names.split())

@@ -1,0 +1,103 @@
+"""Any number of objectives, all the way: an environment with a third one through every script, tables and resuming."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scripts import run_script
+
+from analysis import make_tables
+from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts
+
+SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
+OBJECTIVES = ["carbon", "thaw", "timber"]
+WEIGHTS = [f"weight_{name}" for name in OBJECTIVES]
+RETURNS = [f"{name}_return" for name in OBJECTIVES]
+
+
+def train(script, folder, *more):
+    """A training of two checkpoints on the boreal environment with timber."""
+    rollout = ("--rollout-steps", 1024, "--update-epochs", 1) if "ppo" in script else ()
+    fixed = ("--preference", 0.25, 0.25, 0.5) if "fixed" in script else ("--eval-weights", 1, 0, 0, 0, 0.5, 0.5)
+    given = ("--env-id", "timber_env:timber-v0", "--vectorization", "lockstep", "--total-timesteps", 4096)
+    run_script(f"cleanrl_style/{script}.py", *given, *rollout, *fixed, "--run-dir", folder, "--eval-episodes", 2, *more)
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_a_third_objective_is_trained_evaluated_resumed_and_tabulated(script, tmp_path, monkeypatch):
+    whole, stopped = tmp_path / "runs" / "whole", tmp_path / "stopped"
+    train(script, whole)
+
+    save = protocol.Run.save
+
+    def save_once(run, global_step, last, **state):
+        save(run, global_step, last, **state)
+        if run.checkpoint_step:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(protocol.Run, "save", save_once)
+    with pytest.raises(SystemExit):
+        train(script, stopped)
+    monkeypatch.undo()
+    assert not (stopped / "evaluation.csv").exists()
+    train(script, stopped)
+    for name in ("episodes.csv", "updates.csv", "evaluation.csv", "policy.pt", "summary.png"):
+        assert (whole / name).read_bytes() == (stopped / name).read_bytes(), name
+
+    episodes, evaluation = (pd.read_csv(whole / f"{name}.csv") for name in ("episodes", "evaluation"))
+    for table in (episodes, evaluation):
+        assert fronts.objectives_of(table.columns) == OBJECTIVES
+        np.testing.assert_allclose(table[WEIGHTS].sum(axis=1), 1, rtol=1e-6)
+        dot = (table[WEIGHTS].to_numpy() * table[RETURNS].to_numpy()).sum(axis=1)
+        np.testing.assert_allclose(table.scalarized_return, dot, atol=1e-6)
+    assert episodes.timber_return.max() > 0
+    config = json.loads((whole / "config.json").read_text())
+    given = [[0.25, 0.25, 0.5]] if "fixed" in script else [[1, 0, 0], [0, 0.5, 0.5]]
+    assert config["arguments"]["eval_weights"] == given
+    assert evaluation[WEIGHTS].drop_duplicates().to_numpy().tolist() == given
+    if "fixed" in script:
+        assert (episodes[WEIGHTS] == given[0]).all(axis=None)
+
+    make_tables.main(make_tables.Args(runs_dir=(tmp_path / "runs",), tables_dir=tmp_path / "tables"))
+    assert "timber" in "".join(path.read_text() for path in (tmp_path / "tables").glob("*.csv"))
+
+
+def test_learning_follows_three_weights(tmp_path):
+    """On the toy, whose best mixture for each weight is known."""
+    corners = (1, 0, 0, 0, 1, 0, 0, 0, 1)
+    given = ("--env-id", "toy_env:toy-three-v0", "--total-timesteps", 24_000, "--num-envs", 4, "--learning-rate", 2e-3)
+    run_script(
+        "cleanrl_style/ppo_gated.py", *given, "--run-dir", tmp_path, "--eval-episodes", 2, "--eval-weights", *corners
+    )
+    evaluation = pd.read_csv(tmp_path / "evaluation.csv")
+    greedy = evaluation[evaluation.policy == "greedy"]
+    assert greedy.groupby(["weight_carbon", "weight_thaw"]).scalarized_return.mean().min() > 9
+
+
+def test_without_weights_a_lattice_is_evaluated(tmp_path):
+    run_script(
+        "cleanrl_style/eupg_var_lambda.py",
+        *("--env-id", "toy_env:toy-three-v0", "--total-timesteps", 80, "--num-envs", 2, "--eval-episodes", 1),
+        *("--run-dir", tmp_path),
+    )
+    evaluation = pd.read_csv(tmp_path / "evaluation.csv")
+    weights = evaluation[["weight_carbon", "weight_thaw", "weight_variety"]].drop_duplicates().to_numpy()
+    assert weights.shape == (15, 3)
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (("--eval-weights", 0, 1), "--eval-weights: 3 numbers a weight, not 2 in all"),
+        (("--eval-weights", 0.5, 0.5, 0.5), "--eval-weights: 3 numbers >= 0 that sum to 1 is allowed"),
+    ],
+)
+def test_weights_off_the_simplex_are_refused(arguments, message, tmp_path):
+    with pytest.raises(SystemExit, match=message):
+        run_script(
+            "cleanrl_style/ppo_gated.py", "--env-id", "toy_env:toy-three-v0", "--run-dir", tmp_path / "r", *arguments
+        )
+    assert not (tmp_path / "r").exists()
