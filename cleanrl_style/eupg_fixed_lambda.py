@@ -143,7 +143,7 @@ def eupg_loss(agent, x, mask, action, utility):
 if __name__ == "__main__":
     args = protocol.parse(Args)
     args.eval_weights = (args.preference,)
-    task = protocol.make_task(args, preference=args.preference)
+    task = protocol.make_task(args, preference=args.preference, hide_site=args.hide_site)
     episode_columns = task.episode_columns
     update_columns = (
         "iteration",

@@ -142,7 +142,7 @@ def eupg_loss(agent, x, mask, action, utility):
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
-    task = protocol.make_task(args)
+    task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns
     update_columns = (
         "iteration",

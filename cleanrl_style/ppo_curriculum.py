@@ -13,7 +13,6 @@ import torch.nn as nn
 import torch.optim as optim
 from torch.distributions.categorical import Categorical
 
-import boreal_env
 from cleanrl_style import protocol
 
 
@@ -225,7 +224,7 @@ class Curriculum:
         self.layers = [generator.normal(0, n**-0.5, (n, m)) for n, m in zip(sizes[:-1], sizes[1:], strict=True)]
         self.mean, self.std = 0.0, 1.0
         if not args.raw_selector and self.coin is None and not self.accepts_all:
-            logits = self.logit(boreal_env.sample_site_observations(range(1000)))
+            logits = self.logit(task.sample_sites(range(1000)))
             self.mean, self.std = logits.mean(), logits.std()
         # sum and number of the returns seen so far in each tenth of the preference (of each of its m - 1 weights)
         self.shape = (10,) * (task.num_objectives - 1)

@@ -391,6 +391,7 @@ def test_same_command_twice_gives_the_same_bytes(finished_run, tmp_path):
         "evaluation.csv",
         "timing.csv",
         "checkpoint.pt",
+        "policy.pt",
         "summary.png",
     }
     for name in names - {"timing.csv"}:

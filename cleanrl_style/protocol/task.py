@@ -103,6 +103,10 @@ class Task:
             return self.masks(observations)
         return np.stack([as_mask(answer) for answer in envs.call("action_masks")])
 
+    def sample_sites(self, site_seeds) -> np.ndarray:
+        """What is observed at `site_entries` of sites with these seeds, (n, entries)."""
+        return boreal_env.sample_site_observations(site_seeds)
+
     def make(self, **kwargs) -> gym.Env:
         """One environment."""
         return gym.make(self.env_id, disable_env_checker=True, **self.env_kwargs, **kwargs)
@@ -117,7 +121,7 @@ class Task:
 
 def as_option(weights: np.ndarray):
     """Weights (..., m) as an environment's reset takes them: of two objectives, the first's alone."""
-    return weights[..., 0] if weights.shape[-1] == 2 else weights
+    return weights[..., 0][()] if weights.shape[-1] == 2 else weights  # [()]: of one preference a number
 
 
 def as_mask(answer) -> np.ndarray:

@@ -1,0 +1,41 @@
+"""A trained policy, loaded again from its run's folder, plays as it did in the run's own evaluation."""
+
+import pandas as pd
+import pytest
+from scripts import ROOT, run_script
+
+from cleanrl_style import protocol
+
+TOY = "toy_env:toy-v0"
+SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
+
+
+def train(path, folder):
+    given = ("--env-id", TOY, "--total-timesteps", 80, "--num-envs", 2, "--eval-episodes", 2, "--run-dir", folder)
+    run_script(path, *given, *(("--rollout-steps", 40) if "ppo" in str(path) else ()))
+
+
+def evaluate_again(folder, policy):
+    written = pd.read_csv(folder / "evaluation.csv")
+    again, _ = protocol.evaluate(protocol.Task.of(TOY), policy, written.preference.unique(), 2)
+    pd.testing.assert_frame_equal(written, again, rtol=1e-8, check_dtype=False)
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_a_loaded_agent_plays_the_evaluation_again(script, tmp_path):
+    train(f"cleanrl_style/{script}.py", tmp_path)
+    evaluate_again(tmp_path, protocol.load_agent(tmp_path))
+
+
+def test_the_agent_of_a_script_elsewhere(tmp_path):
+    path = tmp_path / "ppo_own.py"
+    path.write_text((ROOT / "cleanrl_style" / "ppo_gated.py").read_text())
+    train(path, tmp_path / "run")
+    with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_own.py; .*script=path"):
+        protocol.load_agent(tmp_path / "run")
+    evaluate_again(tmp_path / "run", protocol.load_agent(tmp_path / "run", script=path))
+
+
+def test_a_folder_without_a_policy_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match="has no config.json: a finished run"):
+        protocol.load_agent(tmp_path)

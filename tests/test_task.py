@@ -1,0 +1,93 @@
+"""What an environment can do is asked of it, not looked up by its id."""
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+import pytest
+from scripts import run_script
+from toy_env import ToyEnv
+
+import boreal_env
+from cleanrl_style import protocol
+
+gym.register("short-v0", entry_point="boreal_env:BorealEnv", kwargs={"years": 3})
+gym.register("own-masks-v0", entry_point="boreal_env:BorealEnv", kwargs={"harvest_min_class": "old", "years": 3})
+gym.register("blind-v0", entry_point="boreal_env:BorealEnv", kwargs={"observation_groups": ("preference", "climate")})
+gym.register("contrast-v0", entry_point="boreal_env:BorealEnv", kwargs={"thaw_formulation": "contrast", "years": 3})
+
+
+def test_ids_of_the_benchmark():
+    task = protocol.Task.of("boreal-generalist-v0")
+    assert (task.boreal, task.has_lockstep, task.mode, task.years) == (True, True, "generalist", 50)
+    assert task.objectives == ("carbon", "thaw")
+    assert task.site_entries == tuple(range(43, 105))
+    site_specific = protocol.Task.of("boreal-site-specific-v0")
+    assert (site_specific.mode, site_specific.site_entries) == ("site-specific", ())
+
+
+def test_an_environment_of_ours_under_another_id_loses_nothing(tmp_path, capsys):
+    """Annual record, compilation before workers, hidden site, lockstep with a preference: all without the id's help."""
+    run_script(
+        "cleanrl_style/eupg_fixed_lambda.py",
+        *("--env-id", "short-v0", "--hide-site", "--vectorization", "lockstep", "--preference", 0.25),
+        *("--num-envs", 2, "--total-timesteps", 12, "--eval-episodes", 2, "--run-dir", tmp_path),
+    )
+    assert "compiling the physics" in capsys.readouterr().out
+    years = pd.read_csv(tmp_path / "evaluation_years.csv")
+    assert years.year.max() == 3 and "biomass_kgc_m2" in set(years.variable)
+    episodes = pd.read_csv(tmp_path / "episodes.csv")
+    assert len(episodes) == 4 and (episodes.preference == 0.25).all() and episodes.final_density.notna().all()
+
+
+def test_its_length_is_asked():
+    with pytest.raises(SystemExit, match="an episode of each environment: 6 steps"):
+        run_script("cleanrl_style/eupg_var_lambda.py", "--env-id", "short-v0", "--num-envs", 2, "--total-timesteps", 4)
+
+
+def test_its_own_thaw_formulation_stays():
+    task = protocol.Task.of("contrast-v0")
+    assert task.thaw_formulation == "contrast"
+    with pytest.raises(SystemExit, match="contradicts --env-id contrast-v0, which is generalist"):
+        run_script("cleanrl_style/ppo_gated.py", "--env-id", "contrast-v0", "--mode", "site-specific")
+
+
+@pytest.mark.parametrize("env_id", ["short-v0", "own-masks-v0", "blind-v0", "toy-v0"])
+def test_masks_are_the_environments_own(env_id):
+    task = protocol.Task.of(env_id)
+    assert (task.masks is None) == (env_id in ("blind-v0", "toy-v0"))
+    envs = gym.vector.SyncVectorEnv([task.make, task.make])
+    observations, _ = envs.reset(seed=3)
+    expected = np.stack([env.unwrapped.action_masks() for env in envs.envs])
+    np.testing.assert_array_equal(task.action_masks(envs, observations), expected)
+
+
+def test_objectives_have_names():
+    assert protocol.Task.of("toy_env:toy-three-v0").objectives == ("carbon", "thaw", "variety")
+
+    class Unnamed(ToyEnv):
+        pass
+
+    gym.register("unnamed-v0", entry_point=Unnamed)
+    assert protocol.Task.of("unnamed-v0").objectives == ("carbon", "thaw")
+
+
+def test_rows_of_two_and_of_three_objectives():
+    two = protocol.Task.of("toy_env:toy-v0").returns_row(np.array([0.25, 0.75]), np.array([4.0, 8.0]))
+    assert two == {"preference": 0.25, "carbon_return": 4, "thaw_return": 8, "scalarized_return": 7}
+    three = protocol.Task.of("toy_env:toy-three-v0").returns_row(np.array([0.25, 0.25, 0.5]), np.array([4.0, 8.0, 2.0]))
+    assert list(three) == [
+        *("weight_carbon", "weight_thaw", "weight_variety"),
+        *("carbon_return", "thaw_return", "variety_return", "scalarized_return"),
+    ]
+    assert three["scalarized_return"] == 4
+
+
+def test_a_subclass_without_a_vector_form_is_evaluated_in_a_plain_loop():
+    class Mine(boreal_env.BorealEnv):
+        pass
+
+    gym.register("mine-v0", entry_point=Mine, kwargs={"years": 2})
+    task = protocol.Task.of("mine-v0")
+    assert task.boreal and not task.has_lockstep
+    episodes, _ = protocol.evaluate(task, lambda o, m, r: np.eye(25)[np.full(len(o), 12)], [0.5], 1, ("greedy",))
+    assert np.isfinite(episodes.scalarized_return).all()
