@@ -144,7 +144,7 @@ def test_advantages_are_normalised_per_objective_then_weighed():
 
 
 def make_curriculum(raw=False, seed=1, size=OBSERVATIONS, selector="network"):
-    task = SimpleNamespace(num_objectives=2, site_entries=range(43, size))
+    task = protocol.Task("sites-v0", {}, ("carbon", "thaw"), site_entries=tuple(range(43, size)))
     return Curriculum(task, Args(seed=seed, raw_selector=raw, selector=selector))
 
 
