@@ -12,7 +12,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from boreal_env import HISTORY_NAMES
 from sim import soil
 from sim.demography import AGES
 from sim.jit import uncompiled
@@ -82,7 +81,7 @@ class View:
 def view_of(episodes, i: int) -> View:
     """What there is to draw of episode `i`."""
     years = episodes.history[i, : episodes.year[i]]
-    history = {name: years[:, k] for k, name in enumerate(HISTORY_NAMES)}
+    history = {name: years[:, k] for k, name in enumerate(episodes.history_names)}
     row = episodes.stands.state[i]
     stocks = episodes.stands.stocks([i])
     start = {name: float(stocks[name][0]) for name in ("biomass_kgc_m2", "soil_kgc_m2")} | {"hwp_kgc_m2": 0.0}
@@ -94,7 +93,7 @@ def view_of(episodes, i: int) -> View:
             start[name] = history[name][0] - history[change][0]
     return View(
         seed=int(episodes.episode_seeds[i]),
-        preference=float(episodes.preference[i]),
+        preference=float(episodes.weights[i, 0]),
         years=episodes.years,
         parameters=dict(zip(PARAMETER_NAMES, episodes.stands.parameters[i], strict=True)),
         state=dict(zip(STATE, row, strict=False)),

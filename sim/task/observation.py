@@ -1,0 +1,261 @@
+"""What is observed: one table, a row an entry, which space, names, values, masks and documentation follow.
+
+A row says where its value comes from: a function of a `Moment`, stands at the end of a year or before the first.
+To observe something more, add a row.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from gymnasium.spaces import Box
+
+import sim
+from sim.demography import AGE_CLASSES
+from sim.management import CONIFER_MIXES, DENSITY_CHANGES
+from sim.task.objectives import HISTORY_NAMES, PAPER_OBJECTIVES
+
+SPECIES_AND_AGES = tuple(product(("conifer", "deciduous"), AGE_CLASSES))
+AGE_ENTRIES = tuple(f"{species}_{age_class}" for species, age_class in SPECIES_AND_AGES)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A number of stands at the end of a year. Before the first, the past year is one in which nothing happened."""
+
+    weights: np.ndarray  # (n, objectives) the preference
+    year: np.ndarray  # (n,) years so far
+    stocks: dict  # what `sim.Stands.stocks` says of them now
+    record: dict  # column of the past year's record, of `HISTORY_NAMES` -> (n,)
+    actions: np.ndarray  # (n,) of the past year
+    parameters: dict  # site parameter, constant or mechanism -> (n,)
+    before: Callable[[str], np.ndarray]  # entry -> its value a year ago (n,)
+
+    @cached_property
+    def age_shares(self) -> np.ndarray:
+        """Shares in all stems, (n, species and age classes)."""
+        density = self.stocks["density_stems_ha"]
+        return self.stocks["age_classes"] / np.where(density > 0.0, density, 1.0)[:, None]
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# Where a value comes from
+# ---------------------------------------------------------------------------------------------------------------
+
+Source = Callable[[Moment], np.ndarray]
+
+
+def weight(objective: int) -> Source:
+    """The preference's weight of an objective, by its number."""
+    return lambda now: now.weights[:, objective]
+
+
+def stock(name: str) -> Source:
+    """What the stand is now."""
+    return lambda now: now.stocks[name]
+
+
+def age_share(stems: int) -> Source:
+    """Stems of a species and age class, by number, among all stems."""
+    return lambda now: now.age_shares[:, stems]
+
+
+def recorded(name: str) -> Source:
+    """A column of the past year's record."""
+    if name not in HISTORY_NAMES:
+        raise ValueError(f"no column of the annual record: {name!r}")
+    return lambda now: now.record[name]
+
+
+def a_year_ago(entry: str) -> Source:
+    """What another entry was then."""
+    return lambda now: now.before(entry)
+
+
+def parameter(name: str) -> Source:
+    """A parameter of the site."""
+    return lambda now: now.parameters[name]
+
+
+def years(now: Moment) -> np.ndarray:
+    """Years so far."""
+    return now.year
+
+
+def carbon_stock(now: Moment) -> np.ndarray:
+    """Carbon of the living trees and the soil."""
+    return now.stocks["biomass_kgc_m2"] + now.stocks["soil_kgc_m2"]
+
+
+def growing_season_length(now: Moment) -> np.ndarray:
+    """Days from the site's growth start to its leaf fall."""
+    return now.parameters["fall_start_day"] - now.parameters["growth_start_day"]
+
+
+def density_index(now: Moment) -> np.ndarray:
+    """The past action's place in `DENSITY_CHANGES`."""
+    return now.actions // len(CONIFER_MIXES)
+
+
+def mix_index(now: Moment) -> np.ndarray:
+    """The past action's place in `CONIFER_MIXES`."""
+    return now.actions % len(CONIFER_MIXES)
+
+
+def density_change(now: Moment) -> np.ndarray:
+    """What was carried out of the past action."""
+    return now.record["planted_stems_ha"] - now.record["thinned_stems_ha"]
+
+
+def mix_change(now: Moment) -> np.ndarray:
+    """How much the past action changed the conifer fraction."""
+    return now.record["conifer_fraction_after_action"] - now.before("conifer_fraction")
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# The table, in the paper's order
+# ---------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Observed:
+    """One entry of the observation: (value + shift) / scale, with the physical limits of the value."""
+
+    name: str
+    group: str
+    unit: str
+    shift: float
+    scale: float
+    low: float
+    high: float
+    source: Source
+
+
+STOCK, CHANGE = 200.0, 100.0  # kgC m-2, beyond what a boreal stand can hold or move in a year
+MOST = {"density": len(DENSITY_CHANGES) - 1, "mix": len(CONIFER_MIXES) - 1}  # the last index of each
+OBSERVED_SITE = tuple(sim.SITE_PARAMETERS)
+
+
+def limits(name: str) -> tuple[float, float]:
+    """Physical limits of a site parameter."""
+    return sim.SITE_PARAMETERS[name].physical_low, sim.SITE_PARAMETERS[name].physical_high
+
+
+def climate(name: str, unit: str, shift: float, scale: float, of: str) -> Observed:
+    """The row of the climate that is the site parameter `of`, scaled as the paper's."""
+    return Observed(name, "climate", unit, shift, scale, *limits(of), parameter(of))
+
+
+def site(name: str) -> Observed:
+    """The row of a site parameter: its share of the range that it is sampled from."""
+    p = sim.SITE_PARAMETERS[name]
+    return Observed(f"site_{name}", "site", p.unit, -p.low, p.high - p.low, *limits(name), parameter(name))
+
+
+(EARLIEST_GROWTH, LATEST_GROWTH), (EARLIEST_FALL, LATEST_FALL) = limits("growth_start_day"), limits("fall_start_day")
+SEASON = EARLIEST_FALL - LATEST_GROWTH, LATEST_FALL - EARLIEST_GROWTH
+
+#: All entries but the preference's: name, group, unit, shift, scale, low, high, source.
+ROWS = (
+    Observed("year", "state", "yr", 0, 50, 0, 1000, years),
+    Observed("density", "state", "stems ha-1", 0, 1500, 0, 15000, stock("density_stems_ha")),
+    Observed("conifer_fraction", "state", "1", 0, 1, 0, 1, stock("conifer_fraction")),
+    Observed("carbon_stock", "state", "kgC m-2", 0, 50, 0, 2 * STOCK, carbon_stock),
+    climate("latitude", "degN", -50, 20, of="latitude_deg"),
+    climate("mean_annual_temperature", "degC", 10, 20, of="mean_annual_temperature_c"),
+    climate("seasonal_amplitude", "degC", 0, 30, of="seasonal_amplitude_c"),
+    climate("growth_start_day", "day of year", 0, 365, of="growth_start_day"),
+    climate("fall_start_day", "day of year", 0, 365, of="fall_start_day"),
+    Observed("growing_season_length", "climate", "day", 0, 200, *SEASON, growing_season_length),
+    Observed("fire_mortality_1yr", "disturbance", "1", 0, 1, 0, 1, recorded("fire_mortality")),
+    Observed("fire_mortality_2yr", "disturbance", "1", 0, 1, 0, 1, a_year_ago("fire_mortality_1yr")),
+    Observed("insect_mortality_1yr", "disturbance", "1", 0, 1, 0, 1, recorded("insect_mortality")),
+    Observed("insect_mortality_2yr", "disturbance", "1", 0, 1, 0, 1, a_year_ago("insect_mortality_1yr")),
+    Observed("drought_index_1yr", "disturbance", "mm", 0, 100, 0, 1e4, recorded("drought_index")),
+    Observed("drought_index_2yr", "disturbance", "mm", 0, 100, 0, 1e4, a_year_ago("drought_index_1yr")),
+    Observed("biomass_change", "carbon", "kgC m-2", 0.5, 1.0, -CHANGE, CHANGE, recorded("biomass_change_kgc_m2")),
+    Observed("soil_change", "carbon", "kgC m-2", 0.2, 0.4, -CHANGE, CHANGE, recorded("soil_change_kgc_m2")),
+    Observed("total_change", "carbon", "kgC m-2", 0.7, 1.4, -CHANGE, CHANGE, recorded("net_carbon_change_kgc_m2")),
+    Observed("natural_mortality", "carbon", "kgC m-2", 0, 0.5, 0, CHANGE, recorded("mortality_kgc_m2")),
+    Observed("litterfall", "carbon", "kgC m-2", 0, 2.0, 0, CHANGE, recorded("litterfall_kgc_m2")),
+    Observed("thinning_loss", "carbon", "kgC m-2", 0.5, 1.0, 0, CHANGE, recorded("harvest_kgc_m2")),
+    Observed("products_stored", "carbon", "kgC m-2", 0, 0.5, 0, CHANGE, recorded("hwp_stored_kgc_m2")),
+    Observed("density_action", "management", "index", 0, MOST["density"], 0, MOST["density"], density_index),
+    Observed("mix_action", "management", "index", 0, MOST["mix"], 0, MOST["mix"], mix_index),
+    Observed("density_change", "management", "stems ha-1", 100, 200, -100, 100, density_change),
+    Observed("mix_change", "management", "1", 0, 1, -1, 1, mix_change),
+    *(Observed(name, "age", "1", 0, 1, 0, 1, age_share(k)) for k, name in enumerate(AGE_ENTRIES)),
+    Observed("biomass", "stocks", "kgC m-2", 0, 50, 0, STOCK, stock("biomass_kgc_m2")),
+    Observed("soil", "stocks", "kgC m-2", 0, 50, 0, STOCK, stock("soil_kgc_m2")),
+    Observed("biomass_limit_penalty", "penalties", "1", 0, 0.5, 0, 100, recorded("biomass_limit_penalty")),
+    Observed("soil_limit_penalty", "penalties", "1", 0, 0.5, 0, 100, recorded("soil_limit_penalty")),
+    Observed("density_penalty", "penalties", "1", 0, 1.0, 0, 100, recorded("density_penalty")),
+    *(site(name) for name in OBSERVED_SITE),
+)
+
+
+def observation_rows(objectives: Sequence[str]) -> tuple[Observed, ...]:
+    """All rows for objectives of these names: the weights of all but the last come first."""
+    names = ["preference"] if len(objectives) == 2 else [f"preference_{name}" for name in objectives[:-1]]
+    return (*(Observed(name, "preference", "1", 0, 1, 0, 1, weight(k)) for k, name in enumerate(names)), *ROWS)
+
+
+OBSERVATION = observation_rows(PAPER_OBJECTIVES)
+OBSERVATION_NAMES = tuple(row.name for row in OBSERVATION)
+OBSERVATION_GROUPS = tuple(dict.fromkeys(row.group for row in OBSERVATION))
+
+
+# ---------------------------------------------------------------------------------------------------------------
+# What follows from rows
+# ---------------------------------------------------------------------------------------------------------------
+
+
+def observation_space(rows: Sequence[Observed], highest: dict[str, float]) -> Box:
+    """Box of rows, with bounds from physical limits, widened for float32 rounding.
+
+    highest : entry -> what a user's constants can raise it to, beyond the limit of the table.
+    """
+    low = normalised(rows, np.array([row.low for row in rows]))
+    high = normalised(rows, np.array([max(row.high, highest.get(row.name, row.high)) for row in rows]))
+    margin = 1e-4 * (high - low)
+    return Box((low - margin).astype(np.float32), (high + margin).astype(np.float32), dtype=np.float32)
+
+
+def values(rows: Sequence[Observed], now: Moment) -> np.ndarray:
+    """Values of rows at a moment, each in its unit, shape (n, rows)."""
+    columns = np.empty((len(rows), len(now.year)))
+    for row, column in zip(rows, columns, strict=True):
+        column[:] = row.source(now)
+    return columns.T
+
+
+def normalised(rows: Sequence[Observed], table: np.ndarray) -> np.ndarray:
+    """What is observed of values in their units, shapes (..., rows)."""
+    shift, scale = np.array([(row.shift, row.scale) for row in rows]).T
+    return (table + shift) / scale
+
+
+class Reader:
+    """Entries of observations in their own units again: observations (n, names) -> float64 (n, wanted); picklable."""
+
+    def __init__(self, wanted: Sequence[str], names: Sequence[str] = OBSERVATION_NAMES):
+        rows = {row.name: row for row in ROWS}
+        self.columns = [list(names).index(name) for name in wanted]
+        self.shift, self.scale = np.array([(rows[name].shift, rows[name].scale) for name in wanted]).T
+
+    def __call__(self, observations: np.ndarray) -> np.ndarray:
+        return observations[:, self.columns].astype(float) * self.scale - self.shift
+
+
+def in_unit(observations: np.ndarray, name: str, names: Sequence[str] = OBSERVATION_NAMES) -> np.ndarray:
+    """One entry of observations with these names, or with the first of them, in its own unit again, shape (n,)."""
+    return Reader((name,), names)(observations)[:, 0]
+
+
+def sample_site_observations(site_seeds: Sequence[int]) -> np.ndarray:
+    """The site entries of the observation for sites with these seeds, shape (n, 62), float32."""
+    rows = [row for row in ROWS if row.group == "site"]
+    sites = [sim.sample_site(seed) for seed in site_seeds]
+    return normalised(rows, np.array([[site[name] for name in OBSERVED_SITE] for site in sites])).astype(np.float32)

@@ -1,0 +1,64 @@
+"""The preference: a weight for each of the m objectives, none negative, that sum to 1.
+
+Two objectives need one number, the weight of the first, and outside of this package that is what they have: in
+options, in the observation and in the last step's info.
+"""
+
+import numpy as np
+
+ROUND_OFF = 1e-6  # by which given weights may miss the sum of 1
+
+
+def check_weights(value, objectives: int, what: str = "preference") -> np.ndarray:
+    """Weights (objectives,) from what a user gives: that many numbers, or for two objectives the first alone.
+
+    Weights are kept as given. Raises ValueError that names `what`, the value and what is allowed.
+    """
+    if objectives == 2 and not np.iterable(value):
+        if not _is_number(value) or not 0.0 <= value <= 1.0:
+            raise ValueError(f"{what}: a number in [0, 1] is allowed, got {value!r}")
+        first = abs(float(value))  # 0.0 for -0.0
+        return np.array([first, 1.0 - first])
+    weights = list(value) if np.iterable(value) else []
+    right = len(weights) == objectives and all(_is_number(weight) and weight >= 0.0 for weight in weights)
+    if not right or abs(sum(weights) - 1.0) > ROUND_OFF:
+        raise ValueError(
+            f"{what}: a weight for each of {objectives} objectives, none negative, 1 in sum, is allowed, got {value!r}"
+        )
+    return np.abs(np.array(weights, dtype=float))
+
+
+def spread_weights(value, number: int, objectives: int) -> list:
+    """Weights for each of `number` episodes, or None for each, from one preference for all or a sequence of them.
+
+    Of two objectives a flat sequence has a number for each episode; of others it is the weights of all.
+    """
+    if value is None:
+        return [None] * number
+    if np.ndim(value) == (0 if objectives == 2 else 1):
+        return [check_weights(value, objectives)] * number
+    if not np.iterable(value) or isinstance(value, str) or len(value) != number:
+        got = len(value) if np.iterable(value) else repr(value)
+        raise ValueError(f"preference: one value or {number} are allowed, got {got}")
+    return [None if one is None else check_weights(one, objectives) for one in value]
+
+
+def draw_weights(generator: np.random.Generator, objectives: int) -> np.ndarray:
+    """Weights (objectives,), uniform on the simplex: the gaps that objectives - 1 uniform draws leave in [0, 1]."""
+    cuts = np.sort(generator.random(objectives - 1))
+    return np.diff(cuts, prepend=0.0, append=1.0)
+
+
+def observed_weights(observations: np.ndarray, objectives: int) -> np.ndarray:
+    """Weights (n, objectives), float64, of whole observations, which have all but the last at their front."""
+    first = np.asarray(observations)[:, : objectives - 1].astype(float)
+    return np.column_stack([first, 1.0 - first.sum(axis=1)])
+
+
+def shown(weights: np.ndarray):
+    """Weights as users meet them: of two objectives the weight of the first, a float; else a copy of all."""
+    return float(weights[0]) if len(weights) == 2 else weights.copy()
+
+
+def _is_number(value) -> bool:
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
