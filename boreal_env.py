@@ -50,7 +50,38 @@ from sim.task.observation import (
 )
 from sim.task.preference import check_weights, draw_weights, observed_weights, spread_weights
 
-__all__ = []
+__all__ = [
+    "BALANCED_CARBON_SCALE",
+    "BorealEnv",
+    "BorealVectorEnv",
+    "DEFAULT_YEARS",
+    "HISTORY_NAMES",
+    "MODES",
+    "MaskFunction",
+    "NO_CHANGE",
+    "OBSERVATION",
+    "OBSERVATION_GROUPS",
+    "OBSERVATION_NAMES",
+    "Objective",
+    "Observed",
+    "PAPER_OBJECTIVES",
+    "REWARD_COLUMNS",
+    "Reward",
+    "THAW_FORMULATIONS",
+    "action_masks",
+    "carbon_reward",
+    "check_weights",
+    "draw_weights",
+    "in_unit",
+    "objective_names",
+    "observed_weights",
+    "reward_components",
+    "rewards_of_year",
+    "sample_site_observations",
+    "thaw_reward",
+    "valid_actions",
+    "warm_up",
+]
 
 
 def warm_up(num_envs: int = 1) -> None:

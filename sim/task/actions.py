@@ -20,6 +20,7 @@ NO_CHANGE = FIRST_UNCHANGED + CONIFER_MIXES.index(0.5)  # an action that neither
 #: Entries of the observation that a mask is made of.
 NEEDED = ("density", *AGE_ENTRIES)
 
+CHANGES = np.array(DENSITY_CHANGES)
 _feasible_change = uncompiled(feasible_change)
 
 
@@ -36,8 +37,7 @@ def valid_actions(density: np.ndarray, harvestable: np.ndarray) -> np.ndarray:
     that far below the largest density when planting.
     """
     little = 0.5 * NEGLIGIBLE_STEMS
-    changes = np.array(DENSITY_CHANGES)
-    valid = _feasible_change(changes, density[:, None] + little, harvestable[:, None] + little) == changes
+    valid = _feasible_change(CHANGES, density[:, None] + little, harvestable[:, None] + little) == CHANGES
     return np.repeat(valid, len(CONIFER_MIXES), axis=1)
 
 

@@ -10,7 +10,6 @@ import sim
 from sim.management import check_actions
 from sim.parameters import check_seed
 from sim.spin_up import check_initial_ranges
-from sim.state import PARAMETER_NAMES
 from sim.task.actions import MaskFunction, mask_function, unchanged
 from sim.task.checks import check_choice
 from sim.task.objectives import (
@@ -23,7 +22,7 @@ from sim.task.objectives import (
     objective_names,
     rewards_of_year,
 )
-from sim.task.observation import Moment, normalised, observation_rows, observation_space, values
+from sim.task.observation import Moment, Table, observation_rows
 from sim.task.preference import check_weights, draw_weights, shown
 
 MODES = ("generalist", "site_specific")
@@ -94,29 +93,27 @@ class Episodes:
             hwp_half_life_years=hwp_half_life_years,
             harvest_min_class=harvest_min_class,
         )
-        self.rows = observation_rows(self.objective_names)
-        self.row_numbers = {row.name: i for i, row in enumerate(self.rows)}
-        groups = check_groups(observation_groups, [row.group for row in self.rows])
+        self.table = Table(observation_rows(self.objective_names))
+        self.masks = MaskFunction(self.table.names, harvest_min_class)
+        rows = self.table.rows
+        groups = check_groups(observation_groups, [row.group for row in rows])
         if mode == "site_specific":
             groups = tuple(group for group in groups if group != "site")
-        self.entries = [i for i, row in enumerate(self.rows) if row.group in groups]
+        self.entries = [i for i, row in enumerate(rows) if row.group in groups]
         if not self.entries:
             raise ValueError(f"observation_groups = {observation_groups!r}: nothing is left to observe in mode {mode}")
-        kept = [self.rows[i] for i in self.entries]
-        highest = {row.name: row.high for row in self.rows}
-        self.observation_names = tuple(row.name for row in kept)
-        self.observation_space = observation_space(
-            kept, self.reward.largest_penalties(highest["biomass"], highest["soil"])
-        )
-        self.mask_function = mask_function(self.observation_names, harvest_min_class)
-        self.mask_of_all_entries = MaskFunction(tuple(self.row_numbers), harvest_min_class)
+        kept = Table([rows[i] for i in self.entries])
+        self.observation_names = kept.names
+        self.mask_function = mask_function(kept.names, harvest_min_class)
+        most = {row.name: row.high for row in rows}
+        self.observation_space = kept.space(self.reward.largest_penalties(most["biomass"], most["soil"]))
         self.weights = np.zeros((number, len(objectives)))
         self.site_seeds = np.zeros(number, dtype=np.int64)
         self.episode_seeds = np.zeros(number, dtype=np.int64)
         self.year = np.zeros(number, dtype=int)
         self.running = np.zeros(number, dtype=bool)
         self.history = np.zeros((number, self.years, len(self.history_names)))
-        self.observed = np.zeros((number, len(self.rows)))  # values of all rows, in their units
+        self.observed = np.zeros((number, len(rows)))  # values of all rows, in their units
 
     def draw(self, generator: np.random.Generator) -> tuple[int, int, np.ndarray]:
         """Site seed, episode seed and preference of an episode: always as many draws."""
@@ -156,23 +153,22 @@ class Episodes:
             raise RuntimeError(f"step on episode {stopped} that is not running: call reset first")
         actions = check_actions(actions, self.number)
         record = self.stands.step(actions)
-        columns = dict(zip(sim.RECORD_NAMES, record.T, strict=True))
-        columns |= rewards_of_year(record, actions, self.reward, self.thaw_formulation)
+        parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
         for objective in self.own_objectives:
-            columns |= objective.columns(columns)
-        added = np.array([columns[name] for name in self.history_names[record.shape[1] :]])
+            parts |= objective.columns(dict(zip(sim.RECORD_NAMES, record.T, strict=True)) | parts)
+        added = np.array([parts[name] for name in self.history_names[record.shape[1] :]])
         year = np.concatenate([record, added.T], axis=1)
         self.history[np.arange(self.number), self.year] = year
         self.year = self.year + 1
         self.running = self.year < self.years
-        self.observed = self.values_of(np.arange(self.number), columns, actions, self.observed)
+        self.observed = self.values_of(np.arange(self.number), year, actions, self.observed)
         return year.take(self.reward_columns, axis=1).astype(np.float32)
 
     def observe_start(self, indices: np.ndarray) -> None:
         """Observe stands that have just been started, as after a year in which nothing happened."""
-        nothing = dict.fromkeys(self.history_names, np.zeros(len(indices)))
+        nothing = np.zeros((len(indices), len(self.history_names)))
         actions = unchanged(self.stands.stocks(indices)["conifer_fraction"])
-        before = np.zeros((len(indices), len(self.rows)))
+        before = np.zeros((len(indices), len(self.table.rows)))
         self.observed[indices] = self.values_of(indices, nothing, actions, before)
 
     def values_of(self, indices, record, actions, before) -> np.ndarray:
@@ -183,19 +179,19 @@ class Episodes:
             stocks=self.stands.stocks(indices),
             record=record,
             actions=actions,
-            parameters=dict(zip(PARAMETER_NAMES, self.stands.parameters[indices].T, strict=True)),
-            before=lambda name: before[:, self.row_numbers[name]],
+            parameters=self.stands.parameters[indices],
+            before=lambda name: before[:, self.table.names.index(name)],
         )
-        return values(self.rows, now)
+        return self.table.values(now)
 
     def observations(self) -> np.ndarray:
         """Fresh float32 observations, shape (number, entries)."""
-        return normalised(self.rows, self.observed)[:, self.entries].astype(np.float32)
+        return self.table.normalised(self.observed)[:, self.entries].astype(np.float32)
 
     def action_masks(self) -> np.ndarray:
         """Actions that can be carried out in full, bool, shape (number, 25)."""
         self.check_begun("action_masks")
-        return self.mask_of_all_entries(normalised(self.rows, self.observed).astype(np.float32))
+        return self.masks(self.table.normalised(self.observed).astype(np.float32))
 
     def check_begun(self, what: str) -> None:
         """Refuse what needs a stand before the first reset."""

@@ -15,6 +15,7 @@ from gymnasium.spaces import Box
 import sim
 from sim.demography import AGE_CLASSES
 from sim.management import CONIFER_MIXES, DENSITY_CHANGES
+from sim.state import PARAMETER_NAMES
 from sim.task.objectives import HISTORY_NAMES, PAPER_OBJECTIVES
 
 SPECIES_AND_AGES = tuple(product(("conifer", "deciduous"), AGE_CLASSES))
@@ -28,9 +29,9 @@ class Moment:
     weights: np.ndarray  # (n, objectives) the preference
     year: np.ndarray  # (n,) years so far
     stocks: dict  # what `sim.Stands.stocks` says of them now
-    record: dict  # column of the past year's record, of `HISTORY_NAMES` -> (n,)
+    record: np.ndarray  # (n, columns of `HISTORY_NAMES`) of the past year, or more
     actions: np.ndarray  # (n,) of the past year
-    parameters: dict  # site parameter, constant or mechanism -> (n,)
+    parameters: np.ndarray  # (n, columns of `sim.state.PARAMETER_NAMES`)
     before: Callable[[str], np.ndarray]  # entry -> its value a year ago (n,)
 
     @cached_property
@@ -47,9 +48,35 @@ class Moment:
 Source = Callable[[Moment], np.ndarray]
 
 
+@dataclass(frozen=True)
+class Column:
+    """A source that is a column of one of a moment's arrays."""
+
+    array: str
+    number: int
+
+    def __call__(self, now: Moment) -> np.ndarray:
+        return getattr(now, self.array)[:, self.number]
+
+
 def weight(objective: int) -> Source:
     """The preference's weight of an objective, by its number."""
-    return lambda now: now.weights[:, objective]
+    return Column("weights", objective)
+
+
+def recorded(name: str) -> Source:
+    """A column of the past year's record."""
+    return Column("record", HISTORY_NAMES.index(name))
+
+
+def parameter(name: str) -> Source:
+    """A parameter of the site, or a constant of the simulator."""
+    return Column("parameters", PARAMETER_NAMES.index(name))
+
+
+def age_share(entry: str) -> Source:
+    """Stems of a species and age class among all stems."""
+    return Column("age_shares", AGE_ENTRIES.index(entry))
 
 
 def stock(name: str) -> Source:
@@ -57,26 +84,14 @@ def stock(name: str) -> Source:
     return lambda now: now.stocks[name]
 
 
-def age_share(stems: int) -> Source:
-    """Stems of a species and age class, by number, among all stems."""
-    return lambda now: now.age_shares[:, stems]
-
-
-def recorded(name: str) -> Source:
-    """A column of the past year's record."""
-    if name not in HISTORY_NAMES:
-        raise ValueError(f"no column of the annual record: {name!r}")
-    return lambda now: now.record[name]
-
-
 def a_year_ago(entry: str) -> Source:
     """What another entry was then."""
     return lambda now: now.before(entry)
 
 
-def parameter(name: str) -> Source:
-    """A parameter of the site."""
-    return lambda now: now.parameters[name]
+growth_start, fall_start = parameter("growth_start_day"), parameter("fall_start_day")
+planted, thinned = recorded("planted_stems_ha"), recorded("thinned_stems_ha")
+conifer_fraction_after_action = recorded("conifer_fraction_after_action")
 
 
 def years(now: Moment) -> np.ndarray:
@@ -91,7 +106,7 @@ def carbon_stock(now: Moment) -> np.ndarray:
 
 def growing_season_length(now: Moment) -> np.ndarray:
     """Days from the site's growth start to its leaf fall."""
-    return now.parameters["fall_start_day"] - now.parameters["growth_start_day"]
+    return fall_start(now) - growth_start(now)
 
 
 def density_index(now: Moment) -> np.ndarray:
@@ -106,12 +121,12 @@ def mix_index(now: Moment) -> np.ndarray:
 
 def density_change(now: Moment) -> np.ndarray:
     """What was carried out of the past action."""
-    return now.record["planted_stems_ha"] - now.record["thinned_stems_ha"]
+    return planted(now) - thinned(now)
 
 
 def mix_change(now: Moment) -> np.ndarray:
     """How much the past action changed the conifer fraction."""
-    return now.record["conifer_fraction_after_action"] - now.before("conifer_fraction")
+    return conifer_fraction_after_action(now) - now.before("conifer_fraction")
 
 
 # ---------------------------------------------------------------------------------------------------------------
@@ -186,7 +201,7 @@ ROWS = (
     Observed("mix_action", "management", "index", 0, MOST["mix"], 0, MOST["mix"], mix_index),
     Observed("density_change", "management", "stems ha-1", 100, 200, -100, 100, density_change),
     Observed("mix_change", "management", "1", 0, 1, -1, 1, mix_change),
-    *(Observed(name, "age", "1", 0, 1, 0, 1, age_share(k)) for k, name in enumerate(AGE_ENTRIES)),
+    *(Observed(name, "age", "1", 0, 1, 0, 1, age_share(name)) for name in AGE_ENTRIES),
     Observed("biomass", "stocks", "kgC m-2", 0, 50, 0, STOCK, stock("biomass_kgc_m2")),
     Observed("soil", "stocks", "kgC m-2", 0, 50, 0, STOCK, stock("soil_kgc_m2")),
     Observed("biomass_limit_penalty", "penalties", "1", 0, 0.5, 0, 100, recorded("biomass_limit_penalty")),
@@ -212,29 +227,44 @@ OBSERVATION_GROUPS = tuple(dict.fromkeys(row.group for row in OBSERVATION))
 # ---------------------------------------------------------------------------------------------------------------
 
 
-def observation_space(rows: Sequence[Observed], highest: dict[str, float]) -> Box:
-    """Box of rows, with bounds from physical limits, widened for float32 rounding.
+class Table:
+    """Rows, and what follows from them. Arrays of values or observations have a column for each row."""
 
-    highest : entry -> what a user's constants can raise it to, beyond the limit of the table.
-    """
-    low = normalised(rows, np.array([row.low for row in rows]))
-    high = normalised(rows, np.array([max(row.high, highest.get(row.name, row.high)) for row in rows]))
-    margin = 1e-4 * (high - low)
-    return Box((low - margin).astype(np.float32), (high + margin).astype(np.float32), dtype=np.float32)
+    def __init__(self, rows: Sequence[Observed]):
+        self.rows = tuple(rows)
+        self.names = tuple(row.name for row in rows)
+        self.shift, self.scale = np.array([(row.shift, row.scale) for row in rows]).T
+        # columns of the same array are read at once: a step of one stand would else take a percent longer
+        self._columns, self._others = {}, []
+        for number, row in enumerate(rows):
+            if isinstance(row.source, Column):
+                self._columns.setdefault(row.source.array, []).append((number, row.source.number))
+            else:
+                self._others.append((number, row.source))
+        self._columns = {array: np.array(pairs).T for array, pairs in self._columns.items()}
 
+    def values(self, now: Moment) -> np.ndarray:
+        """Values at a moment, each in its unit, shape (n, rows)."""
+        values = np.empty((len(self.rows), len(now.year)))
+        for array, (numbers, columns) in self._columns.items():
+            values[numbers] = getattr(now, array).T[columns]
+        for number, source in self._others:
+            values[number] = source(now)
+        return values.T
 
-def values(rows: Sequence[Observed], now: Moment) -> np.ndarray:
-    """Values of rows at a moment, each in its unit, shape (n, rows)."""
-    columns = np.empty((len(rows), len(now.year)))
-    for row, column in zip(rows, columns, strict=True):
-        column[:] = row.source(now)
-    return columns.T
+    def normalised(self, values: np.ndarray) -> np.ndarray:
+        """What is observed of values, shape (n, rows)."""
+        return (values + self.shift) / self.scale
 
+    def space(self, highest: dict[str, float]) -> Box:
+        """Box of the rows, with bounds from physical limits, widened for float32 rounding.
 
-def normalised(rows: Sequence[Observed], table: np.ndarray) -> np.ndarray:
-    """What is observed of values in their units, shapes (..., rows)."""
-    shift, scale = np.array([(row.shift, row.scale) for row in rows]).T
-    return (table + shift) / scale
+        highest : entry -> what a user's constants can raise it to, beyond the limit of its row.
+        """
+        low = self.normalised(np.array([row.low for row in self.rows]))
+        high = self.normalised(np.array([max(row.high, highest.get(row.name, row.high)) for row in self.rows]))
+        margin = 1e-4 * (high - low)
+        return Box((low - margin).astype(np.float32), (high + margin).astype(np.float32), dtype=np.float32)
 
 
 class Reader:
@@ -256,6 +286,6 @@ def in_unit(observations: np.ndarray, name: str, names: Sequence[str] = OBSERVAT
 
 def sample_site_observations(site_seeds: Sequence[int]) -> np.ndarray:
     """The site entries of the observation for sites with these seeds, shape (n, 62), float32."""
-    rows = [row for row in ROWS if row.group == "site"]
+    table = Table([row for row in ROWS if row.group == "site"])
     sites = [sim.sample_site(seed) for seed in site_seeds]
-    return normalised(rows, np.array([[site[name] for name in OBSERVED_SITE] for site in sites])).astype(np.float32)
+    return table.normalised(np.array([[site[name] for name in OBSERVED_SITE] for site in sites])).astype(np.float32)
