@@ -131,8 +131,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     ## Observation Space
     `Box` of 105 values (generalist) or 43 (site-specific, without the 62 site parameters), float32;
     `boreal_env.OBSERVATION` has the name, unit, normalisation and limits of each, `observation_names` the names of
-    those that this environment gives. The first is the preference for carbon; pairs of years have the last year first;
-    age fractions are of all stems.
+    those that this environment gives. The first is the preference for carbon (of m objectives the weights of the first
+    m - 1, of one none); pairs of years have the last year first; age fractions are of all stems.
 
     ## Action Space
     `Discrete(25)`: action = 5 x density index + mix index; density changes (-100, -50, 0, 50, 100) stems/ha, conifer
@@ -145,6 +145,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, soil and wood products over `carbon_scale`,
     less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2. Another
     objective is a function of the year's record: `objectives=("carbon", "thaw", Objective("timber", value, 0, 1))`.
+    The preference has a weight for each, none negative, 1 in sum; of two it is given as one number, the first's.
 
     ## Starting State
     Site, first stocks and ages, weather and preference are drawn anew in generalist mode, and are fixed in
@@ -159,7 +160,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `time_step_minutes`: any divisor of 1440 (30)
     - `backend`: "numba" or "python" (the same source, interpreted)
     - `thaw_formulation`: "asymmetric", "contrast" or "raw_degree_days"
-    - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one
+    - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one; of m objectives, not two, all m weights
     - `site_seed`: one site (`sim.sample_site(site_seed)`) instead of a new one each episode
     - `parameter_overrides`: site parameter -> value or (low, high), see `sim/site_parameters.csv`; nothing else of the
       site changes, but with `latitude_deg` the mean annual temperature, which is drawn around its latitude's
@@ -179,6 +180,12 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `reset(seed=, options={"preference": w, "site": {name: value}})`; seeds are at most 2^63 - 1, here and everywhere.
     `info` is empty but for the last step, where it has the episode's totals. Bad values raise ValueError, a step before
     reset or after the end RuntimeError.
+
+    ## What It Can Be Asked
+    `objective_names`, `reward_dim`, `mode`, `years`, `thaw_formulation`, `site_seed` and `observation_names` are
+    attributes. `lockstep(num_envs, **changes)` gives a `BorealVectorEnv` with the same arguments but for the changes,
+    `mask_function()` a function of observations (n, entries) to valid actions, bool (n, 25), which can be pickled; it
+    is None where `observation_groups` leave out "state" or "age". A wrapped environment is asked as `env.unwrapped`.
 
     ## Saving
     `get_state()` has everything that the future depends on, the running episode and the generators; `set_state` gives
@@ -254,8 +261,8 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
 
     With the same seeds and actions it gives the trajectories of `num_envs` single environments. Episodes that end
     start anew within the step (`AutoresetMode.SAME_STEP`); infos then have `final_obs` and `final_info`.
-    `reset(options={"preference": one or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`, where
-    only stands of the mask start anew.
+    `reset(options={"preference": for all or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`,
+    where only stands of the mask start anew.
 
     `group_size` neighbours share site, start, weather and disturbance dice in every episode, not the preference: all
     but that are drawn from the seed of a group's first stand. The options "site" and "reset_mask" have to be the same
