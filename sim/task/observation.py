@@ -66,11 +66,15 @@ def weight(objective: int) -> Source:
 
 def recorded(name: str) -> Source:
     """A column of the past year's record."""
+    if name not in HISTORY_NAMES:
+        raise ValueError(f"no column of the annual record: {name!r}")
     return Column("record", HISTORY_NAMES.index(name))
 
 
 def parameter(name: str) -> Source:
     """A parameter of the site, or a constant of the simulator."""
+    if name not in PARAMETER_NAMES:
+        raise ValueError(f"no parameter of the simulator: {name!r}")
     return Column("parameters", PARAMETER_NAMES.index(name))
 
 

@@ -14,12 +14,12 @@ def check_weights(value, objectives: int, what: str = "preference") -> np.ndarra
 
     Weights are kept as given. Raises ValueError that names `what`, the value and what is allowed.
     """
-    if objectives == 2 and not np.iterable(value):
+    if objectives == 2 and not _is_sequence(value):
         if not _is_number(value) or not 0.0 <= value <= 1.0:
             raise ValueError(f"{what}: a number in [0, 1] is allowed, got {value!r}")
         first = abs(float(value))  # 0.0 for -0.0
         return np.array([first, 1.0 - first])
-    weights = list(value) if np.iterable(value) else []
+    weights = list(value) if _is_sequence(value) else []
     right = len(weights) == objectives and all(_is_number(weight) and weight >= 0.0 for weight in weights)
     if not right or abs(sum(weights) - 1.0) > ROUND_OFF:
         raise ValueError(
@@ -35,11 +35,12 @@ def spread_weights(value, number: int, objectives: int) -> list:
     """
     if value is None:
         return [None] * number
-    if np.ndim(value) == (0 if objectives == 2 else 1):
+    several = _is_sequence(value)
+    for_all = not several if objectives == 2 else several and all(_is_number(weight) for weight in value)
+    if for_all:
         return [check_weights(value, objectives)] * number
-    if not np.iterable(value) or isinstance(value, str) or len(value) != number:
-        got = len(value) if np.iterable(value) else repr(value)
-        raise ValueError(f"preference: one value or {number} are allowed, got {got}")
+    if not several or len(value) != number:
+        raise ValueError(f"preference: one value or {number} are allowed, got {len(value) if several else value!r}")
     return [None if one is None else check_weights(one, objectives) for one in value]
 
 
@@ -62,3 +63,7 @@ def shown(weights: np.ndarray):
 
 def _is_number(value) -> bool:
     return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+
+
+def _is_sequence(value) -> bool:
+    return np.iterable(value) and not isinstance(value, str)
