@@ -14,6 +14,7 @@ from gymnasium.vector.utils import batch_space
 
 import sim
 from sim.block import compile_kernels
+from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS
 from sim.parameters import check_overrides, check_seed
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
@@ -341,16 +342,14 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
 
     def get_state(self) -> dict:
         """Everything the future depends on, generators included; picklable."""
-        generators = self._generators and [g.bit_generator.state for g in self._generators]
-        return {"episodes": self._episodes.get_state(), "generators": generators}
+        generators = [generator.bit_generator.state for generator in self._generators or []]
+        return {"episodes": self._episodes.get_state(), "generators": generators or None}
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
         check_saved(state, "vector")
         self._episodes.set_state(state["episodes"])
-        self._generators = state["generators"] and [np.random.default_rng(0) for _ in range(self.num_envs)]
-        for generator, value in zip(self._generators or [], state["generators"] or [], strict=True):
-            generator.bit_generator.state = value
+        self._generators = state["generators"] and [restored_generator(saved) for saved in state["generators"]]
 
     def _check_open(self) -> None:
         if self.closed:
@@ -365,9 +364,10 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
                 raise ValueError(f"{what}: the same for stands {first} to {last}, a group, is allowed, got {group}")
 
     def _begin(self, indices, weights, sites) -> None:
-        draws = [self._episodes.draw(self._generators[i]) for i in indices]
+        generators = self._generators or []
+        draws = [self._episodes.draw(generators[i]) for i in indices]
         if self.group_size > 1:
-            leaders = {}
+            leaders: dict[int, tuple] = {}
             for k, i in enumerate(indices):
                 site_seed, episode_seed, _ = leaders.setdefault(i // self.group_size, draws[k])
                 draws[k] = (site_seed, episode_seed, draws[k][2])
@@ -386,11 +386,12 @@ def _spread(name, value, number) -> list:
 # ---------------------------------------------------------------------------------------------------------------
 # Registration
 # ---------------------------------------------------------------------------------------------------------------
-for _name, _kwargs in {
+REGISTERED: dict[str, dict] = {
     "boreal-generalist-v0": {"mode": "generalist"},
     "boreal-site-specific-v0": {"mode": "site_specific"},
     "boreal-balanced-v0": {"mode": "generalist", "balanced": True},
-}.items():
+}
+for _name, _kwargs in REGISTERED.items():
     gym.register(
         id=_name,
         entry_point="boreal_env:BorealEnv",

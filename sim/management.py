@@ -19,10 +19,15 @@ LARGEST_DENSITY = 2000.0  # stems ha-1 that planting reaches
 NEGLIGIBLE_STEMS = 0.01  # stems ha-1; a smaller shortfall counts as done
 
 
+def indices(actions) -> tuple[np.ndarray, np.ndarray]:
+    """Places in `DENSITY_CHANGES` and `CONIFER_MIXES` of integer actions, a = 5 x density index + mix index."""
+    return np.divmod(np.asarray(actions), len(CONIFER_MIXES))
+
+
 def decode(actions) -> tuple[np.ndarray, np.ndarray]:
-    """Density change [stems ha-1] and conifer share of integer actions, a = 5 x density index + mix index."""
-    actions = np.asarray(actions)
-    return _CHANGES[actions // 5], _MIXES[actions % 5]
+    """Density change [stems ha-1] and conifer share of integer actions."""
+    density, mix = indices(actions)
+    return _CHANGES[density], _MIXES[mix]
 
 
 def check_actions(actions, number) -> np.ndarray:

@@ -14,7 +14,7 @@ from gymnasium.spaces import Box
 
 import sim
 from sim.demography import AGE_CLASSES
-from sim.management import CONIFER_MIXES, DENSITY_CHANGES
+from sim.management import CONIFER_MIXES, DENSITY_CHANGES, indices
 from sim.state import PARAMETER_NAMES
 from sim.task.objectives import HISTORY_NAMES, PAPER_OBJECTIVES
 
@@ -115,12 +115,12 @@ def growing_season_length(now: Moment) -> np.ndarray:
 
 def density_index(now: Moment) -> np.ndarray:
     """The past action's place in `DENSITY_CHANGES`."""
-    return now.actions // len(CONIFER_MIXES)
+    return indices(now.actions)[0]
 
 
 def mix_index(now: Moment) -> np.ndarray:
     """The past action's place in `CONIFER_MIXES`."""
-    return now.actions % len(CONIFER_MIXES)
+    return indices(now.actions)[1]
 
 
 def density_change(now: Moment) -> np.ndarray:
@@ -239,13 +239,12 @@ class Table:
         self.names = tuple(row.name for row in rows)
         self.shift, self.scale = np.array([(row.shift, row.scale) for row in rows]).T
         # columns of the same array are read at once: a step of one stand would else take a percent longer
-        self._columns, self._others = {}, []
+        columns: dict[str, list] = {}
         for number, row in enumerate(rows):
             if isinstance(row.source, Column):
-                self._columns.setdefault(row.source.array, []).append((number, row.source.number))
-            else:
-                self._others.append((number, row.source))
-        self._columns = {array: np.array(pairs).T for array, pairs in self._columns.items()}
+                columns.setdefault(row.source.array, []).append((number, row.source.number))
+        self._columns = {array: np.array(pairs).T for array, pairs in columns.items()}
+        self._others = [(k, row.source) for k, row in enumerate(rows) if not isinstance(row.source, Column)]
 
     def values(self, now: Moment) -> np.ndarray:
         """Values at a moment, each in its unit, shape (n, rows)."""
