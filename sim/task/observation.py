@@ -5,8 +5,7 @@ To observe something more, add a row.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
@@ -22,7 +21,7 @@ SPECIES_AND_AGES = tuple(product(("conifer", "deciduous"), AGE_CLASSES))
 AGE_ENTRIES = tuple(f"{species}_{age_class}" for species, age_class in SPECIES_AND_AGES)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Moment:
     """A number of stands at the end of a year. Before the first, the past year is one in which nothing happened."""
 
@@ -33,12 +32,11 @@ class Moment:
     actions: np.ndarray  # (n,) of the past year
     parameters: np.ndarray  # (n, columns of `sim.state.PARAMETER_NAMES`)
     before: Callable[[str], np.ndarray]  # entry -> its value a year ago (n,)
+    age_shares: np.ndarray = field(init=False)  # (n, species and age classes) of all stems
 
-    @cached_property
-    def age_shares(self) -> np.ndarray:
-        """Shares in all stems, (n, species and age classes)."""
+    def __post_init__(self):
         density = self.stocks["density_stems_ha"]
-        return self.stocks["age_classes"] / np.where(density > 0.0, density, 1.0)[:, None]
+        self.age_shares = self.stocks["age_classes"] / np.where(density > 0.0, density, 1.0)[:, None]
 
 
 # ---------------------------------------------------------------------------------------------------------------
