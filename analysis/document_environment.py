@@ -11,7 +11,8 @@ from pathlib import Path
 import tyro
 
 import boreal_env
-from boreal_env import OBSERVATION, BorealEnv, BorealVectorEnv, Objective, Observed, Reward
+from boreal_env import BorealEnv, BorealVectorEnv, Objective, Observed, Reward
+from sim.task.observation import observation_rows
 
 #: Key of the last step's info -> (unit, meaning).
 FINAL_INFO = {
@@ -28,7 +29,7 @@ FINAL_INFO = {
         "of the start, the weather and the dice, as in `sim.simulate(seed=)`; in site-specific mode "
         "the `site_seed`, 0 without one",
     ),
-    "preference": ("1", "weight of carbon that was observed"),
+    "preference": ("1", "weight of carbon that was observed; of m objectives, not two, an array of all m"),
     "final_density": ("stems ha-1", "at the end of the last year"),
     "mean_density": ("stems ha-1", "mean of the years' ends"),
     "final_conifer_fraction": ("1", "conifers among the stems at the end of the last year"),
@@ -46,6 +47,7 @@ FINAL_INFO = {
 
 def page() -> str:
     """The whole page, Markdown."""
+    rows = observation_rows(boreal_env.PAPER_OBJECTIVES)
     columns = textwrap.fill(", ".join(f"`{name}`" for name in boreal_env.REWARD_COLUMNS), 120)
     return f"""# The environment
 
@@ -59,9 +61,10 @@ mo-gymnasium's and other libraries is in [clients.md](clients.md); where the pap
 {inspect.getdoc(BorealVectorEnv)}
 
 ## Observation, entry by entry
-`boreal_env.OBSERVATION`, in the paper's order. The agent sees the normalised value; limits are those of the value *x*
-in its unit, from physics. Names that end in `2yr` are of the year before last. The `site_` entries are the 62
-parameters of `sim/site_parameters.csv`, scaled by the ranges that they are sampled from. Of the last year,
+`boreal_env.OBSERVATION`, in the paper's order and for its two objectives. The agent sees the normalised value; limits
+are those of the value *x* in its unit, from physics. Names that end in `2yr` are of the year before last. The `site_`
+entries are the 62 parameters of `sim/site_parameters.csv`, scaled by the ranges that they are sampled from. Of the last
+year,
 - `total_change` is that of biomass, soil and wood products, `products_stored` what went into products,
 - `thinning_loss` is the carbon of all that was cut, the part that became products included,
 - `density_change` is what was carried out of the action, `mix_change` how much the action changed the conifer fraction
@@ -70,9 +73,10 @@ parameters of `sim/site_parameters.csv`, scaled by the ranges that they are samp
 Before the first year both indices are those of an action that changes nothing: the middle density, the nearest mix.
 
 `boreal_env.action_masks(observations)` reads whole observations, 43 or 105 columns; with `observation_groups`, ask the
-environment: `env.action_masks()`.
+environment: `env.action_masks()` or `env.mask_function()`. `boreal_env.in_unit(observations, "density")` gives an entry
+in its unit again.
 
-{table(("index", "name", "unit", "normalised", "limits", "group"), map(observation_row, enumerate(OBSERVATION)))}
+{table(("index", "name", "unit", "normalised", "limits", "group"), map(observation_row, enumerate(rows)))}
 
 ## Reward, constant by constant
 `boreal_env.Reward`; the paper's values. `boreal-balanced-v0` has `carbon_scale = {boreal_env.BALANCED_CARBON_SCALE:g}`
@@ -98,6 +102,7 @@ Of a vector environment each is an array in `infos["final_info"]`.
 def timber(year):
     \"\"\"Revenue from what is cut, 1 for 1 kgC/m2.\"\"\"
     return year["harvest_kgc_m2"]
+
 
 env = gym.make("boreal-generalist-v0", objectives=("carbon", "thaw", boreal_env.Objective("timber", timber, 0.0, 1.0)))
 ```

@@ -1,6 +1,8 @@
 """The forester's action at the start of a year: planting and thinning.
 
-One rule, `feasible_change`, serves the transition here, the action mask and the penalty in `boreal_env`.
+One rule says what part of an action can be carried out, `feasible_change`. The year's transition makes that part and
+records it; the action mask is where it is the whole (`sim.task.actions`); the penalty of an ineffective action is for
+the share that it leaves undone, `missed_share` (`sim.task.objectives`).
 """
 
 import numpy as np
@@ -17,10 +19,15 @@ LARGEST_DENSITY = 2000.0  # stems ha-1 that planting reaches
 NEGLIGIBLE_STEMS = 0.01  # stems ha-1; a smaller shortfall counts as done
 
 
+def indices(actions) -> tuple[np.ndarray, np.ndarray]:
+    """Places in `DENSITY_CHANGES` and `CONIFER_MIXES` of integer actions, a = 5 x density index + mix index."""
+    return np.divmod(np.asarray(actions), len(CONIFER_MIXES))
+
+
 def decode(actions) -> tuple[np.ndarray, np.ndarray]:
-    """Density change [stems ha-1] and conifer share of integer actions, a = 5 x density index + mix index."""
-    actions = np.asarray(actions)
-    return _CHANGES[actions // 5], _MIXES[actions % 5]
+    """Density change [stems ha-1] and conifer share of integer actions."""
+    density, mix = indices(actions)
+    return _CHANGES[density], _MIXES[mix]
 
 
 def check_actions(actions, number) -> np.ndarray:
@@ -50,10 +57,16 @@ def first_cut_age(harvest_min_class: str, constants: dict) -> int:
 
 @compiled
 def feasible_change(change, density, harvestable) -> float:
-    """The part of a density change [stems ha-1] that can be made."""
-    if change > 0.0:
-        return min(change, max(LARGEST_DENSITY - density, 0.0))
-    return -min(-change, harvestable, max(density - LEAST_DENSITY, 0.0))
+    """The part of a density change that can be made, all in stems ha-1: numbers when compiled, or else arrays too."""
+    can_plant = np.maximum(LARGEST_DENSITY - density, 0.0)
+    can_cut = np.minimum(harvestable, np.maximum(density - LEAST_DENSITY, 0.0))
+    return np.maximum(np.minimum(change, can_plant), -can_cut)
+
+
+def missed_share(change, made):
+    """Share of a density change that was not made; a shortfall below `NEGLIGIBLE_STEMS` counts as done."""
+    shortfall = np.abs(change - made)
+    return np.where(shortfall < NEGLIGIBLE_STEMS, 0.0, shortfall / np.maximum(np.abs(change), 1.0))
 
 
 @compiled

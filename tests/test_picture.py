@@ -11,7 +11,7 @@ from PIL import Image
 import boreal_env
 from analysis import draw_readme
 from cleanrl_style import ppo_curriculum
-from sim.task.picture import HEIGHT, WIDTH
+from sim.task.picture import HEIGHT, WIDTH, preference, return_charts, view_of
 
 NO_FIRE = {"fire": False, "insects": False}
 
@@ -128,3 +128,44 @@ def test_the_policy_of_a_run_is_played(tmp_path):
 def test_a_run_without_a_checkpoint_is_refused(tmp_path):
     with pytest.raises(SystemExit, match="no checkpoint"):
         draw_readme.trained_policy(tmp_path)
+
+
+def timber(year):
+    """What is cut."""
+    return year["harvest_kgc_m2"]
+
+
+@pytest.mark.parametrize(
+    "objectives",
+    [("thaw",), ("carbon", "thaw", boreal_env.Objective("timber", timber))],
+    ids=len,
+)
+def test_pictures_of_any_number_of_objectives(objectives):
+    env = boreal_env.BorealEnv(render_mode="rgb_array", objectives=objectives, mechanisms=NO_FIRE)
+    two = boreal_env.BorealEnv(render_mode="rgb_array", mechanisms=NO_FIRE)
+    env.reset(seed=3), two.reset(seed=3)
+    env.step(22), two.step(22)
+    picture, of_two = env.render(), two.render()
+    scene, charts = (slice(40, 480), slice(0, 500)), (slice(270, 500), slice(520, 800))
+    assert np.array_equal(picture[scene], of_two[scene])
+    assert (picture[charts] != of_two[charts]).any()
+
+
+def test_charts_of_the_returns_share_the_room():
+    for number in range(1, 6):
+        places = return_charts(number)
+        assert len(places) == number
+        tops = [bottom + height for _, bottom, _, height in places]
+        assert tops[0] == pytest.approx(0.428) and places[-1][1] == pytest.approx(0.057)
+        assert all(below < place[1] for below, place in zip(tops[1:], places, strict=False))
+
+
+def test_the_title_has_the_weights():
+    def title(**arguments):
+        env = boreal_env.BorealEnv(render_mode="rgb_array", **arguments)
+        env.reset(seed=1)
+        return preference(view_of(env._episodes, 0))
+
+    assert title(fixed_preference=0.25) == "carbon weight 0.25"
+    three = ("carbon", "thaw", boreal_env.Objective("timber", timber))
+    assert title(objectives=three, fixed_preference=[0.5, 0.3, 0.2]) == "weights carbon 0.50, thaw 0.30, timber 0.20"

@@ -147,7 +147,7 @@ class OnSites(boreal_env.BorealVectorEnv):
         super().reset(seed=seed, options={**options, "site": self.sites})
         everyone = np.arange(self.num_envs)
         self._episodes.stands.start(everyone, self.sites, self.seeds)
-        self._episodes._observe_start(everyone, self.sites)
+        self._episodes.observe_start(everyone)
         return self._episodes.observations(), {}
 
 

@@ -6,13 +6,13 @@ Depth in the ground is on a square-root scale.
 """
 
 from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from boreal_env import HISTORY_NAMES
 from sim import soil
 from sim.demography import AGES
 from sim.jit import uncompiled
@@ -33,13 +33,15 @@ SNOWY_MM = 5.0  # water equivalent from which the ground is drawn white
 INK, FAINT = "#22303c", "#8a96a0"
 CONIFER, DECIDUOUS = "#1f6f5c", "#e6a020"
 SOIL, BIOMASS, PRODUCTS = "#6b4226", "#93b36b", "#f0dca0"
-CARBON_RETURN, THAW_RETURN = "#111111", "#0072b2"
+RETURNS = ("#111111", "#0072b2", "#d55e00", "#009e73", "#cc79a7")  # of the objectives, over again beyond five
 ORGANIC, THAWED, FROZEN_WARM, FROZEN_COLD = "#3d2b1f", "#a9825a", "#d3e6f2", "#7fb0d3"
 SMALL, LARGE = 7.5, 9.5  # points
 LABEL = {"facecolor": "white", "alpha": 0.65, "linewidth": 0, "pad": 0.8}
 
 SCENE, GROUND = (0.0, 0.385, 0.655, 0.535), (0.052, 0.075, 0.603, 0.31)  # left, bottom, width, height
-CHARTS = [(0.715, bottom, 0.262, 0.142) for bottom in (0.744, 0.515, 0.286, 0.057)]
+CHART_LEFT, CHART_WIDTH, CHART_HEIGHT, CHART_GAP = 0.715, 0.262, 0.142, 0.087
+CHARTS = [(CHART_LEFT, bottom, CHART_WIDTH, CHART_HEIGHT) for bottom in (0.744, 0.515)]
+RETURN_BOTTOM, RETURN_HEIGHT = 0.057, 2 * CHART_HEIGHT + CHART_GAP  # of the returns' charts, all together
 
 #: The scene in metres at its front edge; the camera stands before it. At distance d all is smaller by
 #: CAMERA_M / (CAMERA_M + d), and the view is as much wider, so that PLOT_M x d + d^2 is the area up to there.
@@ -57,7 +59,7 @@ class View:
     """A stand at the end of a year (or before the first), in the names of the annual record."""
 
     seed: int
-    preference: float
+    weights: dict  # objective -> its weight
     years: int
     parameters: dict
     state: dict
@@ -82,7 +84,7 @@ class View:
 def view_of(episodes, i: int) -> View:
     """What there is to draw of episode `i`."""
     years = episodes.history[i, : episodes.year[i]]
-    history = {name: years[:, k] for k, name in enumerate(HISTORY_NAMES)}
+    history = {name: years[:, k] for k, name in enumerate(episodes.history_names)}
     row = episodes.stands.state[i]
     stocks = episodes.stands.stocks([i])
     start = {name: float(stocks[name][0]) for name in ("biomass_kgc_m2", "soil_kgc_m2")} | {"hwp_kgc_m2": 0.0}
@@ -94,7 +96,7 @@ def view_of(episodes, i: int) -> View:
             start[name] = history[name][0] - history[change][0]
     return View(
         seed=int(episodes.episode_seeds[i]),
-        preference=float(episodes.preference[i]),
+        weights=dict(zip(episodes.objective_names, episodes.weights[i].tolist(), strict=True)),
         years=episodes.years,
         parameters=dict(zip(PARAMETER_NAMES, episodes.stands.parameters[i], strict=True)),
         state=dict(zip(STATE, row, strict=False)),
@@ -105,7 +107,7 @@ def view_of(episodes, i: int) -> View:
 
 
 def draw_stand(episodes, i: int) -> np.ndarray:
-    """Picture of stand `i` of `boreal_env`'s episodes, uint8, shape (500, 800, 3)."""
+    """Picture of stand `i` of `sim.task.episodes.Episodes`, uint8, shape (500, 800, 3)."""
     view = view_of(episodes, i)
     figure = Figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=DPI, facecolor="white")
     canvas = FigureCanvasAgg(figure)
@@ -122,7 +124,7 @@ def draw_title(figure, view: View) -> None:
     p = view.parameters
     title = (
         f"Year {view.year} of {view.years}    {p['latitude_deg']:.1f} °N    "
-        f"annual mean {p['mean_annual_temperature_c']:.1f} °C    carbon weight {view.preference:.2f}"
+        f"annual mean {p['mean_annual_temperature_c']:.1f} °C    {preference(view)}"
     )
     figure.text(0.012, 0.966, title, fontsize=LARGE, color=INK, va="center", weight="bold")
     density = view.stems.sum()
@@ -137,6 +139,14 @@ def draw_title(figure, view: View) -> None:
     if view.last("fire_mortality") > 0.0:
         events.append(f"fire killed {100 * view.last('fire_mortality'):.0f} %")
     figure.text(0.012, 0.938, " · ".join(events), fontsize=SMALL + 0.5, color=INK, va="center")
+
+
+def preference(view: View) -> str:
+    """The weight of the first of two objectives, or those of all."""
+    if len(view.weights) == 2:
+        objective, weight = next(iter(view.weights.items()))
+        return f"{objective} weight {weight:.2f}"
+    return "weights " + ", ".join(f"{objective} {weight:.2f}" for objective, weight in view.weights.items())
 
 
 # ------------------------------------------------------------------------------------------------------------
@@ -384,8 +394,9 @@ def _rgb(colour: str) -> np.ndarray:
 
 
 def draw_years(figure, view: View) -> None:
-    """Stems, carbon stocks and both returns over the years."""
-    stems, stocks, carbon, thaw = (figure.add_axes(place) for place in CHARTS)
+    """Stems, carbon stocks and the return of each objective over the years."""
+    stems, stocks = (figure.add_axes(place) for place in CHARTS)
+    returns = [figure.add_axes(place) for place in return_charts(len(view.weights))]
     years = np.arange(view.year + 1)
 
     now = view.stems.sum(axis=1)
@@ -408,7 +419,7 @@ def draw_years(figure, view: View) -> None:
     _areas(stocks, years, pools)
     _frame(stocks, view, "kgC/m²", 0.0, 4.0 * np.ceil(max(sum(pool[1] for pool in pools)) / 4.0))
 
-    for ax, name, colour in ((carbon, "carbon", CARBON_RETURN), (thaw, "thaw", THAW_RETURN)):
+    for ax, name, colour in zip(returns, view.weights, cycle(RETURNS), strict=False):
         total = np.concatenate([[0.0], np.cumsum(view.history[f"{name}_reward"])])
         ax.axhline(0.0, color=FAINT, linewidth=0.7)
         ax.plot(years, total, color=colour, linewidth=1.8)
@@ -419,8 +430,17 @@ def draw_years(figure, view: View) -> None:
             step * np.ceil(max(total.max(), 0.5) / step),
         )
         _frame(ax, view, f"{name} return {total[-1]:+.2f}", low, high)
-    thaw.tick_params(labelbottom=True)
-    thaw.set_xticks(thaw.get_xticks(), [*(f"{year:g}" for year in thaw.get_xticks()[:-1]), f"{view.years} yr"])
+    last = returns[-1]
+    last.tick_params(labelbottom=True)
+    last.set_xticks(last.get_xticks(), [*(f"{year:g}" for year in last.get_xticks()[:-1]), f"{view.years} yr"])
+
+
+def return_charts(number: int) -> list[tuple[float, float, float, float]]:
+    """Places of so many charts, the first on top, as high as the room lets them be."""
+    gap = CHART_GAP if number <= 2 else 0.6 * CHART_GAP
+    height = (RETURN_HEIGHT - (number - 1) * gap) / number
+    bottoms = [RETURN_BOTTOM + k * (height + gap) for k in reversed(range(number))]
+    return [(CHART_LEFT, bottom, CHART_WIDTH, height) for bottom in bottoms]
 
 
 def _areas(ax, years, layers) -> None:

@@ -1,28 +1,69 @@
-"""A preference: the weights of m objectives, on the simplex; of two, one number says it, the first's weight."""
+"""The preference: a weight for each of the m objectives, none negative, that sum to 1.
 
-from numbers import Real
+Two objectives need one number, the weight of the first, and outside of this package that is what they have: in
+options, in the observation and in the last step's info.
+"""
 
 import numpy as np
 
+ROUND_OFF = 1e-6  # by which given weights may miss the sum of 1
 
-def check_weights(value, m: int, what: str = "preference") -> np.ndarray:
-    """Weights (m,) from a number in [0, 1] (the first's, for two objectives) or m numbers >= 0 that sum to 1.
 
-    Raises ValueError naming the value and what is allowed.
+def check_weights(value, objectives: int, what: str = "preference") -> np.ndarray:
+    """Weights (objectives,) from what a user gives: that many numbers, or for two objectives the first alone.
+
+    Weights are kept as given. Raises ValueError that names `what`, the value and what is allowed.
     """
-    one = isinstance(value, (Real, np.number)) and not isinstance(value, (bool, np.bool_))
-    if m == 2 and one and 0.0 <= value <= 1.0:
-        return np.array([abs(float(value)), 1.0 - float(value)])  # 0.0 for -0.0
-    sequence = isinstance(value, (list, tuple, np.ndarray)) and np.shape(value) == (m,)
-    if sequence and np.issubdtype(np.asarray(value).dtype, np.number):
-        weights = np.asarray(value, dtype=float)
-        if (weights >= 0.0).all() and abs(weights.sum() - 1.0) <= 1e-6:
-            return weights + 0.0  # 0.0 for -0.0
-    number = "a number in [0, 1]" if m == 2 else f"{m} numbers >= 0 that sum to 1"
-    raise ValueError(f"{what}: {number} is allowed, got {value!r}")
+    if objectives == 2 and not _is_sequence(value):
+        if not _is_number(value) or not 0.0 <= value <= 1.0:
+            raise ValueError(f"{what}: a number in [0, 1] is allowed, got {value!r}")
+        first = abs(float(value))  # 0.0 for -0.0
+        return np.array([first, 1.0 - first])
+    weights = list(value) if _is_sequence(value) else []
+    right = len(weights) == objectives and all(_is_number(weight) and weight >= 0.0 for weight in weights)
+    if not right or abs(sum(weights) - 1.0) > ROUND_OFF:
+        raise ValueError(
+            f"{what}: a weight for each of {objectives} objectives, none negative, 1 in sum, is allowed, got {value!r}"
+        )
+    return np.abs(np.array(weights, dtype=float))
 
 
-def observed_weights(observations: np.ndarray, m: int) -> np.ndarray:
-    """Weights (n, m), float64, of observations (n, d), whose first m - 1 entries they are."""
-    first = np.asarray(observations[:, : m - 1], dtype=np.float64)
-    return np.hstack([first, 1.0 - first.sum(axis=1, keepdims=True)])
+def spread_weights(value, number: int, objectives: int) -> list:
+    """Weights for each of `number` episodes, or None for each, from one preference for all or a sequence of them.
+
+    Of two objectives a flat sequence has a number for each episode; of others it is the weights of all.
+    """
+    if value is None:
+        return [None] * number
+    several = _is_sequence(value)
+    for_all = not several if objectives == 2 else several and all(_is_number(weight) for weight in value)
+    if for_all:
+        return [check_weights(value, objectives)] * number
+    if not several or len(value) != number:
+        raise ValueError(f"preference: one value or {number} are allowed, got {len(value) if several else value!r}")
+    return [None if one is None else check_weights(one, objectives) for one in value]
+
+
+def draw_weights(generator: np.random.Generator, objectives: int) -> np.ndarray:
+    """Weights (objectives,), uniform on the simplex: the gaps that objectives - 1 uniform draws leave in [0, 1]."""
+    cuts = np.sort(generator.random(objectives - 1))
+    return np.diff(cuts, prepend=0.0, append=1.0)
+
+
+def observed_weights(observations: np.ndarray, objectives: int) -> np.ndarray:
+    """Weights (n, objectives), float64, of whole observations, which have all but the last at their front."""
+    first = np.asarray(observations)[:, : objectives - 1].astype(float)
+    return np.column_stack([first, 1.0 - first.sum(axis=1)])
+
+
+def shown(weights: np.ndarray):
+    """Weights as users meet them: of two objectives the weight of the first, a float; else a copy of all."""
+    return float(weights[0]) if len(weights) == 2 else weights.copy()
+
+
+def _is_number(value) -> bool:
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+
+
+def _is_sequence(value) -> bool:
+    return np.iterable(value) and not isinstance(value, str)

@@ -1,0 +1,294 @@
+"""Episodes side by side: what the environment of one stand and that of many in lockstep share."""
+
+import inspect
+from collections.abc import Sequence
+
+import numpy as np
+from gymnasium.spaces import Box
+
+import sim
+from sim.management import check_actions
+from sim.parameters import check_seed
+from sim.spin_up import check_initial_ranges
+from sim.task.actions import MaskFunction, mask_function, unchanged
+from sim.task.checks import check_choice
+from sim.task.objectives import (
+    HISTORY_NAMES,
+    PAPER_OBJECTIVES,
+    THAW_FORMULATIONS,
+    Objective,
+    Reward,
+    check_objectives,
+    objective_names,
+    rewards_of_year,
+)
+from sim.task.observation import Moment, Table, observation_rows
+from sim.task.preference import check_weights, draw_weights, shown
+
+MODES = ("generalist", "site_specific")
+DEFAULT_YEARS = 50
+
+
+class Episodes:
+    """`number` episodes side by side. Arguments are those of `BorealEnv`, checked here."""
+
+    def __init__(
+        self,
+        number,
+        *,
+        mode="generalist",
+        years=DEFAULT_YEARS,
+        time_step_minutes=30,
+        backend="numba",
+        thaw_formulation="asymmetric",
+        fixed_preference=None,
+        site_seed=None,
+        parameter_overrides=None,
+        initial_ranges=None,
+        hwp_half_life_years=None,
+        harvest_min_class="young",
+        reward=None,
+        balanced=False,
+        objectives=PAPER_OBJECTIVES,
+        mechanisms=None,
+        constants=None,
+        observation_groups=None,
+        record_years=False,
+    ):
+        check_choice("mode", mode, MODES)
+        check_choice("thaw_formulation", thaw_formulation, THAW_FORMULATIONS)
+        if isinstance(years, bool) or not isinstance(years, (int, np.integer)) or not 1 <= years <= 1000:
+            raise ValueError(f"years: an integer in [1, 1000] is allowed, got {years!r}")
+        if site_seed is not None:
+            check_seed("site_seed", site_seed)
+        for name, value in (("balanced", balanced), ("record_years", record_years)):
+            if not isinstance(value, (bool, np.bool_)):
+                raise ValueError(f"{name}: True or False is allowed, got {value!r}")
+        self.number, self.mode, self.years = number, mode, int(years)
+        self.thaw_formulation = thaw_formulation
+        sim.middle_site(parameter_overrides)
+        self.site_seed, self.parameter_overrides = site_seed, dict(parameter_overrides or {})
+        self.initial_ranges = check_initial_ranges(initial_ranges)
+        self.harvest_min_class = harvest_min_class
+        self.reward = Reward.of(reward, bool(balanced))
+        objectives = check_objectives(objectives)
+        self.objective_names = tuple(objective_names(objectives))
+        self.fixed_weights = None
+        if fixed_preference is not None:
+            self.fixed_weights = check_weights(fixed_preference, len(objectives), "fixed_preference")
+        self.own_objectives = [objective for objective in objectives if isinstance(objective, Objective)]
+        self.history_names = HISTORY_NAMES + tuple(
+            f"{objective.name}_{what}" for objective in self.own_objectives for what in ("clipped", "reward")
+        )
+        self.reward_columns = [self.history_names.index(f"{name}_reward") for name in self.objective_names]
+        limits = [(o.low, o.high) if isinstance(o, Objective) else (-1.0, 1.0) for o in objectives]
+        self.reward_space = Box(*np.array(limits, dtype=np.float32).T, dtype=np.float32)
+        self.record_years = bool(record_years)
+        self.stands = sim.Stands(
+            number,
+            time_step_minutes=time_step_minutes,
+            backend=backend,
+            constants=constants,
+            mechanisms=mechanisms,
+            hwp_half_life_years=hwp_half_life_years,
+            harvest_min_class=harvest_min_class,
+        )
+        self.table = Table(observation_rows(self.objective_names))
+        self.masks = MaskFunction(self.table.names, harvest_min_class)
+        rows = self.table.rows
+        groups = check_groups(observation_groups, [row.group for row in rows])
+        if mode == "site_specific":
+            groups = tuple(group for group in groups if group != "site")
+        self.entries = [i for i, row in enumerate(rows) if row.group in groups]
+        if not self.entries:
+            raise ValueError(f"observation_groups = {observation_groups!r}: nothing is left to observe in mode {mode}")
+        kept = Table([rows[i] for i in self.entries])
+        self.observation_names = kept.names
+        self.mask_function = mask_function(kept.names, harvest_min_class)
+        most = {row.name: row.high for row in rows}
+        self.observation_space = kept.space(self.reward.largest_penalties(most["biomass"], most["soil"]))
+        self.weights = np.zeros((number, len(objectives)))
+        self.site_seeds = np.zeros(number, dtype=np.int64)
+        self.episode_seeds = np.zeros(number, dtype=np.int64)
+        self.year = np.zeros(number, dtype=int)
+        self.running = np.zeros(number, dtype=bool)
+        self.history = np.zeros((number, self.years, len(self.history_names)))
+        self.observed = np.zeros((number, len(rows)))  # values of all rows, in their units
+
+    def draw(self, generator: np.random.Generator) -> tuple[int, int, np.ndarray]:
+        """Site seed, episode seed and preference of an episode: always as many draws."""
+        site_seed, episode_seed = int(generator.integers(2**31)), int(generator.integers(2**62))
+        return site_seed, episode_seed, draw_weights(generator, len(self.objective_names))
+
+    def begin(self, indices, draws, preferences, sites) -> None:
+        """Start episodes. draws : for each, `draw`'s result; preferences (weights), sites : for each, or None."""
+        chosen, seeds, given = [], [], {}
+        for k, i in enumerate(indices):
+            site_seed, episode_seed, weights = draws[k]
+            overrides = {**self.parameter_overrides, **(sites[k] or {})}
+            if self.mode == "site_specific":
+                # A fixed world: one site, one start, one weather, one set of disturbance dice.
+                overrides.setdefault("daily_noise_std_c", 0.0)
+                episode_seed = 0 if self.site_seed is None else self.site_seed
+                given[k] = {n: 0.5 * (a + b) for n, (a, b) in {**sim.INITIAL_RANGES, **self.initial_ranges}.items()}
+            if self.site_seed is not None:
+                site_seed = self.site_seed
+            fixed_middle = self.mode == "site_specific" and self.site_seed is None
+            chosen.append(sim.middle_site(overrides) if fixed_middle else sim.sample_site(site_seed, overrides))
+            seeds.append(sim.episode_seeds(episode_seed))
+            self.site_seeds[i] = -1 if fixed_middle else site_seed
+            self.episode_seeds[i] = episode_seed
+            wanted = self.fixed_weights if preferences[k] is None else preferences[k]
+            self.weights[i] = weights if wanted is None else wanted
+        self.stands.start(indices, chosen, seeds, given, self.initial_ranges)
+        self.year[indices] = 0
+        self.running[indices] = True
+        self.history[indices] = 0.0
+        self.observe_start(np.asarray(indices))
+
+    def advance(self, actions) -> np.ndarray:
+        """A year for all episodes; returns float32 rewards (number, objectives)."""
+        if not self.running.all():
+            stopped = int(np.argmin(self.running))
+            raise RuntimeError(f"step on episode {stopped} that is not running: call reset first")
+        actions = check_actions(actions, self.number)
+        record = self.stands.step(actions)
+        parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
+        for objective in self.own_objectives:
+            parts |= objective.columns(dict(zip(sim.RECORD_NAMES, record.T, strict=True)) | parts)
+        added = np.array([parts[name] for name in self.history_names[record.shape[1] :]])
+        year = np.concatenate([record, added.T], axis=1)
+        self.history[np.arange(self.number), self.year] = year
+        self.year = self.year + 1
+        self.running = self.year < self.years
+        self.observed = self.values_of(np.arange(self.number), year, actions, self.observed)
+        return year.take(self.reward_columns, axis=1).astype(np.float32)
+
+    def observe_start(self, indices: np.ndarray) -> None:
+        """Observe stands that have just been started, as after a year in which nothing happened."""
+        nothing = np.zeros((len(indices), len(self.history_names)))
+        actions = unchanged(self.stands.stocks(indices)["conifer_fraction"])
+        before = np.zeros((len(indices), len(self.table.rows)))
+        self.observed[indices] = self.values_of(indices, nothing, actions, before)
+
+    def values_of(self, indices, record, actions, before) -> np.ndarray:
+        """Values of all rows (n, rows) for stands after a year; before : those of a year ago."""
+        now = Moment(
+            weights=self.weights[indices],
+            year=self.year[indices],
+            stocks=self.stands.stocks(indices),
+            record=record,
+            actions=actions,
+            parameters=self.stands.parameters[indices],
+            before=lambda name: before[:, self.table.names.index(name)],
+        )
+        return self.table.values(now)
+
+    def observations(self) -> np.ndarray:
+        """Fresh float32 observations, shape (number, entries)."""
+        return self.table.normalised(self.observed)[:, self.entries].astype(np.float32)
+
+    def action_masks(self) -> np.ndarray:
+        """Actions that can be carried out in full, bool, shape (number, 25)."""
+        self.check_begun("action_masks")
+        return self.masks(self.table.normalised(self.observed).astype(np.float32))
+
+    def check_begun(self, what: str) -> None:
+        """Refuse what needs a stand before the first reset."""
+        fresh = ~self.running & (self.year == 0)
+        if fresh.any():
+            raise RuntimeError(f"{what} of episode {int(np.argmax(fresh))} that has not begun: call reset first")
+
+    def final_info(self, i: int) -> dict:
+        """Totals of a finished episode."""
+        years = dict(zip(self.history_names, self.history[i, : self.year[i]].T, strict=True))
+
+        def mean(name):
+            return float(years[name].mean())
+
+        names = (*PAPER_OBJECTIVES, *(objective.name for objective in self.own_objectives))
+        info = {
+            **{f"{name}_return": float(years[f"{name}_reward"].sum()) for name in names},
+            "site_seed": int(self.site_seeds[i]),
+            "episode_seed": int(self.episode_seeds[i]),
+            "preference": shown(self.weights[i]),
+            "final_density": float(years["density_stems_ha"][-1]),
+            "mean_density": mean("density_stems_ha"),
+            "final_conifer_fraction": float(years["conifer_fraction"][-1]),
+            "mean_conifer_fraction": mean("conifer_fraction"),
+            **{name: mean(name) for name in ("growing_season_days", "latent_heat_mj_m2", "ground_shortwave_mj_m2")},
+        }
+        if self.record_years:
+            record = {name: column.copy() for name, column in years.items()}
+            info["years"] = {"year": np.arange(1, self.year[i] + 1), **record}
+        return info
+
+    def get_state(self) -> dict:
+        """All that the future depends on."""
+        names = ("weights", "site_seeds", "episode_seeds", "year", "running", "history", "observed")
+        state = {name: getattr(self, name).copy() for name in names}
+        return {"mode": self.mode, "stands": self.stands.get_state(), **state}
+
+    def set_state(self, state: dict) -> None:
+        """Continue from `get_state`."""
+        there, here = (
+            (mode, *history.shape, weights.shape[1])
+            for mode, history, weights in (
+                (state["mode"], state["history"], state["weights"]),
+                (self.mode, self.history, self.weights),
+            )
+        )
+        if there != here:
+            what = "mode, episodes, years, columns of the record, objectives"
+            raise ValueError(f"state of ({what}) {there} given to {here}")
+        self.stands.set_state(state["stands"])
+        for name, value in state.items():
+            if name not in ("mode", "stands"):
+                setattr(self, name, value.copy())
+
+
+def check_groups(wanted, groups: Sequence[str]) -> tuple[str, ...]:
+    """Groups of the observation to keep: those wanted, or all for None; groups : of each row."""
+    if wanted is None:
+        return tuple(groups)
+    if isinstance(wanted, str) or not np.iterable(wanted):
+        raise ValueError(f"observation_groups: a sequence of names is allowed, got {wanted!r}")
+    wanted = tuple(wanted)
+    for group in wanted:
+        check_choice("observation group", group, tuple(dict.fromkeys(("preference", *groups))))
+    if len(set(wanted)) < len(wanted):
+        raise ValueError(f"observation_groups {', '.join(wanted)}: each is allowed once")
+    return wanted
+
+
+def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict:
+    """Options of `reset`: "preference" and "site" (and what the vector environment adds)."""
+    allowed = ("preference", "site", *extra)
+    if options is not None and not isinstance(options, dict):
+        raise ValueError(f"reset options: a dict is allowed, got {type(options).__name__}")
+    for name in options or {}:
+        if name not in allowed:
+            raise ValueError(f"unknown reset option {name!r}; allowed: {', '.join(allowed)}")
+    return dict(options or {})
+
+
+def check_saved(state: dict, kind: str) -> None:
+    """A dict that `get_state` of the same kind of environment, "single" or "vector", gave."""
+    keys = {"single": ["episodes", "generator"], "vector": ["episodes", "generators"]}
+    got = sorted(state, key=str) if isinstance(state, dict) else type(state).__name__
+    for other in keys:
+        if got == keys[other] != keys[kind]:
+            raise ValueError(f"state of a {other} environment given to a {kind} one")
+    if got != keys[kind]:
+        raise ValueError(f"state: a dict of {', '.join(keys[kind])} from get_state is allowed, got {got}")
+
+
+ARGUMENTS = tuple(name for name in inspect.signature(Episodes).parameters if name != "number")
+
+
+def check_arguments(arguments: dict) -> dict:
+    """Arguments of an environment, all of which it has."""
+    for name in arguments:
+        if name not in ARGUMENTS:
+            raise ValueError(f"unknown argument {name!r}; allowed: {', '.join(ARGUMENTS)}, render_mode")
+    return arguments

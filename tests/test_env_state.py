@@ -1,0 +1,65 @@
+"""Saving an environment in mid-episode and going on."""
+
+import pickle
+
+import numpy as np
+import pytest
+from playing import assert_same, quick, quick_vector, vector_trace
+
+
+def test_an_episode_resumes_from_its_state():
+    env = quick(record_years=True)
+    env.reset(seed=3)
+    for action in (24, 0):
+        env.step(action)
+    saved = pickle.dumps(env.get_state())
+    resumed = quick(record_years=True)
+    resumed.set_state(pickle.loads(saved))
+    np.testing.assert_array_equal(resumed.action_masks(), env.action_masks())
+    for action in (17, 3):
+        for one, other in zip(env.step(action), resumed.step(action), strict=True):
+            assert_same(one, other)
+    np.testing.assert_array_equal(env.reset()[0], resumed.reset()[0])  # the generator goes on too
+
+
+def test_lockstep_resumes_from_its_state():
+    actions = np.random.default_rng(0).integers(0, 25, (9, 5))
+    envs = quick_vector(5, record_years=True)
+    vector_trace(envs, actions[:2], 8)
+    resumed = quick_vector(5, record_years=True)
+    resumed.set_state(pickle.loads(pickle.dumps(envs.get_state())))
+    for row in actions:
+        for one, other in zip(envs.step(row), resumed.step(row), strict=True):
+            assert_same(one, other)
+
+
+def test_a_saved_state_does_not_change_as_the_episode_goes_on():
+    env = quick()
+    env.reset(seed=3)
+    saved = env.get_state()
+    before = pickle.dumps(saved)
+    env.step(24)
+    assert pickle.dumps(saved) == before
+
+
+def test_the_state_of_another_environment_is_refused():
+    saved = quick(years=2)
+    saved.reset(seed=1)
+    with pytest.raises(ValueError, match="2.*4|4.*2"):
+        quick(years=4).set_state(saved.get_state())
+
+
+@pytest.mark.parametrize(("state", "got"), [({}, r"\[\]"), (None, "NoneType"), ({"generator": 1}, r"\['generator'\]")])
+def test_what_is_no_state_is_refused(state, got):
+    for env in (quick(), quick_vector(2)):
+        with pytest.raises(ValueError, match=rf"state: a dict of episodes, generators?.* got {got}"):
+            env.set_state(state)
+
+
+def test_the_state_of_a_vector_environment_is_not_that_of_one():
+    one, envs = quick(), quick_vector(1)
+    one.reset(seed=1), envs.reset(seed=1)
+    with pytest.raises(ValueError, match="state of a vector environment given to a single one"):
+        one.set_state(envs.get_state())
+    with pytest.raises(ValueError, match="state of a single environment given to a vector one"):
+        envs.set_state(one.get_state())
