@@ -3,6 +3,7 @@
 import numpy as np
 
 from baselines_heuristic import main
+from boreal_env import in_unit
 
 TARGET_STEMS_HA = 1000
 
@@ -12,7 +13,7 @@ def policy(observations: np.ndarray, masks: np.ndarray, mix_index: int = 2) -> n
 
     Within 25 stems/ha of the target the nearest change is none: the dead band.
     """
-    density = 1500 * observations[:, 2].astype(np.float64)
+    density = in_unit(observations, "density")
     density_index = 2 + np.clip(np.rint((TARGET_STEMS_HA - density) / 50), -2, 2).astype(int)
     return 5 * density_index + mix_index
 

@@ -64,6 +64,17 @@ def test_a_third_objective_is_trained_evaluated_resumed_and_tabulated(script, tm
     assert "timber" in "".join(path.read_text() for path in (tmp_path / "tables").glob("*.csv"))
 
 
+@pytest.mark.parametrize("script", ["zero_change", "target_density"])
+def test_fixed_strategies_are_evaluated_too(script, tmp_path):
+    given = ("--env-id", "timber_env:timber-v0", "--eval-episodes", 2, "--run-dir", tmp_path)
+    run_script(f"baselines_heuristic/{script}.py", *given)
+    evaluation = pd.read_csv(tmp_path / "evaluation.csv")
+    assert fronts.objectives_of(evaluation.columns) == OBJECTIVES
+    assert len(evaluation[WEIGHTS].drop_duplicates()) == 15
+    dot = (evaluation[WEIGHTS].to_numpy() * evaluation[RETURNS].to_numpy()).sum(axis=1)
+    np.testing.assert_allclose(evaluation.scalarized_return, dot, atol=1e-6)
+
+
 def test_learning_follows_three_weights(tmp_path):
     """On the toy, whose best mixture for each weight is known."""
     corners = (1, 0, 0, 0, 1, 0, 0, 0, 1)
