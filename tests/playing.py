@@ -2,11 +2,14 @@
 
 import numpy as np
 
-from boreal_env import OBSERVATION_NAMES, BorealEnv, BorealVectorEnv, Objective
+from boreal_env import OBSERVATION, OBSERVATION_NAMES, BorealEnv, BorealVectorEnv, Objective
 
 QUICK = {"years": 4, "time_step_minutes": 240}
 INDEX = {name: i for i, name in enumerate(OBSERVATION_NAMES)}
-SITE = slice(43, 105)
+ENTRIES = len(OBSERVATION)
+WITHOUT_SITE = sum(row.group != "site" for row in OBSERVATION)
+SITE = slice(WITHOUT_SITE, ENTRIES)
+CLIMATE = slice(INDEX["latitude"], INDEX["growing_season_length"] + 1)
 ACTIONS = [24, 0, 17, 3]
 NAN = float("nan")
 

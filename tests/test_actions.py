@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from playing import INDEX, NAN, THREE, TIMBER, play, quick, quick_vector
+from playing import ENTRIES, INDEX, NAN, THREE, TIMBER, WITHOUT_SITE, play, quick, quick_vector
 
 import boreal_env
 from sim.jit import uncompiled
@@ -15,7 +15,7 @@ from sim.management import feasible_change, missed_share
 
 def test_masks_of_worked_cases():
     def mask(density, harvestable, **kwargs):
-        observation = np.zeros(43, np.float32)
+        observation = np.zeros(WITHOUT_SITE, np.float32)
         observation[INDEX["density"]] = density / 1500.0
         observation[INDEX["conifer_mature"]] = harvestable / density
         observation[INDEX["deciduous_seedling"]] = 1.0 - harvestable / density
@@ -104,15 +104,19 @@ def test_planting_that_ends_just_below_the_limit_costs_nothing():
 
 
 def test_masks_of_nan_are_refused():
-    observations = np.zeros((2, 43))
+    observations = np.zeros((2, WITHOUT_SITE))
     observations[1, INDEX["density"]] = NAN
     with pytest.raises(ValueError, match="observations: finite densities"):
         boreal_env.action_masks(observations)
 
 
-@pytest.mark.parametrize("shape", [(2, 10), (2, 42), (2, 44), (2, 104), (2, 106), (2, 2, 105), (0,)], ids=str)
+NO_WIDTHS = (10, WITHOUT_SITE - 1, WITHOUT_SITE + 1, ENTRIES - 1, ENTRIES + 1)
+
+
+@pytest.mark.parametrize("shape", [*((2, width) for width in NO_WIDTHS), (2, 2, ENTRIES), (0,)], ids=str)
 def test_masks_of_arrays_that_are_no_whole_observations_are_refused(shape):
-    message = r"observations of shape .*: \(n, 43\) or \(n, 105\), all groups .*; env.action_masks\(\) works"
+    allowed = rf"\(n, {WITHOUT_SITE}\) or \(n, {ENTRIES}\)"
+    message = rf"observations of shape .*: {allowed}, all groups .*; env.action_masks\(\) works"
     with pytest.raises(ValueError, match=message):
         boreal_env.action_masks(np.zeros(shape))
 
@@ -240,7 +244,8 @@ def test_no_mask_function_without_density_and_ages(groups):
 
 
 def test_masks_of_another_number_of_objectives_are_refused():
-    with pytest.raises(ValueError, match=r"observations of shape \(1, 105\): \(n, 44\) or \(n, 106\)"):
-        boreal_env.action_masks(np.zeros((1, 105)), objectives=3)
+    allowed = rf"\(n, {WITHOUT_SITE + 1}\) or \(n, {ENTRIES + 1}\)"
+    with pytest.raises(ValueError, match=rf"observations of shape \(1, {ENTRIES}\): {allowed}"):
+        boreal_env.action_masks(np.zeros((1, ENTRIES)), objectives=3)
     with pytest.raises(ValueError, match="objectives: a positive integer is allowed, got 0"):
-        boreal_env.action_masks(np.zeros((1, 105)), objectives=0)
+        boreal_env.action_masks(np.zeros((1, ENTRIES)), objectives=0)

@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode
 from gymnasium.wrappers import TransformReward
 from mo_gymnasium.wrappers import LinearReward
-from playing import QUICK, THREE, TIMBER, assert_same, play, quick, quick_vector, vector_trace
+from playing import ENTRIES, QUICK, THREE, TIMBER, WITHOUT_SITE, assert_same, play, quick, quick_vector, vector_trace
 
 import boreal_env
 from boreal_env import BorealEnv, BorealVectorEnv, Reward
@@ -28,7 +28,7 @@ IDS = ("boreal-generalist-v0", "boreal-site-specific-v0", "boreal-balanced-v0")
 def test_all_ids_through_all_doors(make, prefix, name):
     env = make(prefix + name, **QUICK)
     assert isinstance(env.unwrapped, BorealEnv)
-    size = 43 if "site-specific" in name else 105
+    size = WITHOUT_SITE if "site-specific" in name else ENTRIES
     assert env.observation_space.shape == env.reset(seed=1)[0].shape == (size,)
     assert env.action_space == gym.spaces.Discrete(25)
     assert env.unwrapped.reward_space == gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -42,7 +42,7 @@ def test_all_ids_as_vector_environment(name):
     assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
     observations, infos = envs.reset(seed=1)
     assert observations in envs.observation_space and infos == {}
-    assert envs.single_observation_space.shape == ((43,) if "site-specific" in name else (105,))
+    assert envs.single_observation_space.shape == (WITHOUT_SITE if "site-specific" in name else ENTRIES,)
 
 
 def test_an_episode_is_fifty_years_by_default():

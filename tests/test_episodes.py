@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from playing import ACTIONS, INDEX, SITE, assert_same, play, quick, quick_vector
+from playing import ACTIONS, CLIMATE, ENTRIES, INDEX, SITE, WITHOUT_SITE, assert_same, play, quick, quick_vector
 
 import boreal_env
 import sim
@@ -82,7 +82,7 @@ def test_a_site_override_changes_nothing_else(how):
     else:
         given = play(quick(record_years=True, parameter_overrides={"q10": 3.1}), ACTIONS, seed=2)
     np.testing.assert_allclose(given[0][0][INDEX["site_q10"]], (3.1 - 1.8) / 0.5, rtol=1e-6)
-    same = np.delete(np.arange(105), INDEX["site_q10"])
+    same = np.delete(np.arange(ENTRIES), INDEX["site_q10"])
     np.testing.assert_array_equal(given[0][0][same], drawn[0][0][same])
     for name in ("precipitation_mm", "air_temperature_c", "planted_stems_ha"):
         np.testing.assert_array_equal(given[2]["years"][name], drawn[2]["years"][name])
@@ -136,7 +136,7 @@ def test_the_interpreted_backend_gives_the_same_episode():
 def test_site_specific_mode_is_one_world_whatever_the_seed():
     episodes = [play(quick(mode="site_specific", record_years=True), ACTIONS, seed=seed) for seed in (1, 2)]
     (one, rewards, info), (other, other_rewards, other_info) = episodes
-    assert one.shape[1] == 43
+    assert one.shape[1] == WITHOUT_SITE
     np.testing.assert_array_equal(one[:, 1:], other[:, 1:])
     assert one[0, 0] != other[0, 0]
     np.testing.assert_array_equal(rewards, other_rewards)
@@ -163,7 +163,7 @@ def test_site_specific_mode_is_the_middle_of_every_range_without_noise():
 def test_site_specific_mode_with_another_site():
     default = play(quick(mode="site_specific"), ACTIONS, seed=1)
     other, again = (play(quick(mode="site_specific", site_seed=5), ACTIONS, seed=seed) for seed in (1, 2))
-    assert not np.array_equal(default[0][0, 5:11], other[0][0, 5:11])
+    assert not np.array_equal(default[0][0, CLIMATE], other[0][0, CLIMATE])
     np.testing.assert_array_equal(other[0][:, 1:], again[0][:, 1:])
     latitude = sim.sample_site(5)["latitude_deg"]
     assert other[0][0, INDEX["latitude"]] == pytest.approx((latitude - 50.0) / 20.0, rel=1e-5)

@@ -7,9 +7,12 @@ import pytest
 from playing import (
     ACTIONS,
     BIOMASS_LIMIT,
+    CLIMATE,
+    ENTRIES,
     INDEX,
     SITE,
     SOIL_LIMIT,
+    WITHOUT_SITE,
     eventful_episode,
     play,
     quick,
@@ -61,7 +64,8 @@ def test_penalties_of_heavy_constants_lie_in_the_observation_space():
     env.reset(seed=1)
     observation = env.step(24)[0]
     assert observation in env.observation_space
-    assert (observation[40:43] > quick().observation_space.high[40:43]).tolist() == [True, True, True]
+    penalties = slice(INDEX["biomass_limit_penalty"], INDEX["density_penalty"] + 1)
+    assert (observation[penalties] > quick().observation_space.high[penalties]).tolist() == [True, True, True]
 
 
 PAPER_ORDER = """
@@ -76,7 +80,7 @@ deciduous_mature deciduous_old biomass soil biomass_limit_penalty soil_limit_pen
 
 def test_entries_have_the_papers_order():
     assert list(OBSERVATION_NAMES) == PAPER_ORDER + [f"site_{name}" for name in sim.SITE_PARAMETERS]
-    assert len(OBSERVATION) == 105
+    assert (ENTRIES, WITHOUT_SITE) == (105, 43)
     assert all(entry.low < entry.high and entry.scale > 0.0 and entry.unit for entry in OBSERVATION)
 
 
@@ -151,12 +155,12 @@ def test_entries_of_the_climate_and_the_site(episode):
     scaled = [(site[name] - low) / (high - low) for name, (low, high) in ranges.items()]
     assert len(scaled) == 62
     for one in observations:
-        np.testing.assert_allclose(one[5:11], climate, rtol=1e-5)
-        np.testing.assert_allclose(one[43:105], scaled, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(one[CLIMATE], climate, rtol=1e-5)
+        np.testing.assert_allclose(one[SITE], scaled, rtol=1e-5, atol=1e-6)
 
 
 def test_every_index_is_compared_with_a_formula():
-    elsewhere = {"density_action", "mix_action", "mix_change", *OBSERVATION_NAMES[5:11], *OBSERVATION_NAMES[43:]}
+    elsewhere = {"density_action", "mix_action", "mix_change", *OBSERVATION_NAMES[CLIMATE], *OBSERVATION_NAMES[SITE]}
     assert FORMULAS.keys() | elsewhere == set(OBSERVATION_NAMES)
 
 
@@ -227,27 +231,27 @@ def test_observation_groups(groups):
 
 def test_observation_names_of_the_modes():
     assert quick().observation_names == OBSERVATION_NAMES
-    assert quick_vector(2, mode="site_specific").observation_names == OBSERVATION_NAMES[:43]
+    assert quick_vector(2, mode="site_specific").observation_names == OBSERVATION_NAMES[:WITHOUT_SITE]
 
 
 # -------------------------------------------------------------------------------------------------- a row more
 
 
 def test_a_row_is_all_that_a_new_entry_needs(monkeypatch):
-    row = Observed("peak_snow", "water", "mm", 0, 100, 0, 1e4, observation.recorded("peak_swe_mm"))
+    row = Observed("snowpack", "snow", "mm", 0, 100, 0, 1e4, observation.recorded("peak_swe_mm"))
     old, _, info = play(quick(record_years=True), ACTIONS, seed=3)
     monkeypatch.setattr(observation, "ROWS", (*observation.ROWS[:1], row, *observation.ROWS[1:]))
     env = quick()
     new, *_ = play(env, ACTIONS, seed=3)
-    assert env.observation_names == (*OBSERVATION_NAMES[:2], "peak_snow", *OBSERVATION_NAMES[2:])
-    assert env.observation_space.shape == (106,) and all(values in env.observation_space for values in new)
+    assert env.observation_names == (*OBSERVATION_NAMES[:2], "snowpack", *OBSERVATION_NAMES[2:])
+    assert env.observation_space.shape == (ENTRIES + 1,) and all(values in env.observation_space for values in new)
     np.testing.assert_array_equal(np.delete(new, 2, axis=1), old)
     assert new[0, 2] == 0.0
     np.testing.assert_allclose(new[1:, 2], info["years"]["peak_swe_mm"] / 100.0, rtol=1e-6)
     np.testing.assert_array_equal(boreal_env.action_masks(new[-1])[0], env.action_masks())
-    assert quick(mode="site_specific").observation_space.shape == (44,)
-    assert quick(observation_groups=("water",)).observation_names == ("peak_snow",)
-    assert "| 2 | `peak_snow` | mm | x / 100 | 0 .. 10000 | water |" in document_environment.page()
+    assert quick(mode="site_specific").observation_space.shape == (WITHOUT_SITE + 1,)
+    assert quick(observation_groups=("snow",)).observation_names == ("snowpack",)
+    assert "| 2 | `snowpack` | mm | x / 100 | 0 .. 10000 | snow |" in document_environment.page()
 
 
 def test_rows_may_look_a_year_back(monkeypatch):
@@ -256,6 +260,12 @@ def test_rows_may_look_a_year_back(monkeypatch):
     observations, *_ = play(quick(), ACTIONS, seed=3)
     np.testing.assert_array_equal(observations[1:, -1], observations[:-1, INDEX["density"]])
     assert observations[0, -1] == 0.0
+
+
+def test_two_rows_of_one_name_are_refused(monkeypatch):
+    monkeypatch.setattr(observation, "ROWS", (*observation.ROWS, observation.ROWS[0]))
+    with pytest.raises(ValueError, match="entries of the observation: each is allowed once, got year twice"):
+        quick()
 
 
 def test_a_column_that_the_record_has_not_is_refused_where_the_row_is_written():

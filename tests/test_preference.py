@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode
-from playing import ACTIONS, INDEX, NAN, QUICK, THREE, TIMBER, play, quick, quick_vector
+from playing import ACTIONS, ENTRIES, INDEX, NAN, QUICK, THREE, TIMBER, play, quick, quick_vector
 
 import boreal_env
 from boreal_env import BorealEnv
@@ -39,7 +39,7 @@ def test_of_three_objectives_two_weights_are_observed():
     observations, _, info = play(env, ACTIONS, seed=1, options={"preference": WEIGHTS})
     two, *_ = play(quick(), ACTIONS, seed=1)
     assert env.observation_names[:2] == ("preference_carbon", "preference_thaw")
-    assert observations.shape == (5, 106) and env.observation_space.shape == (106,)
+    assert observations.shape == (5, ENTRIES + 1) and env.observation_space.shape == (ENTRIES + 1,)
     np.testing.assert_array_equal(observations[:, :2], np.tile(np.float32(WEIGHTS[:2]), (5, 1)))
     np.testing.assert_array_equal(observations[:, 2:], two[:, 1:])
     np.testing.assert_array_equal(info["preference"], WEIGHTS)

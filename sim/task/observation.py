@@ -235,6 +235,9 @@ class Table:
     def __init__(self, rows: Sequence[Observed]):
         self.rows = tuple(rows)
         self.names = tuple(row.name for row in rows)
+        for number, name in enumerate(self.names):
+            if name in self.names[:number]:
+                raise ValueError(f"entries of the observation: each is allowed once, got {name} twice")
         self.shift, self.scale = np.array([(row.shift, row.scale) for row in rows]).T
         # columns of the same array are read at once: a step of one stand would else take a percent longer
         columns: dict[str, list] = {}
