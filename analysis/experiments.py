@@ -3,13 +3,12 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from analysis.methods import LEARNERS, METHODS, STRATEGIES
 from analysis.runs import setting
 from cleanrl_style.protocol.evaluation import MODES
 
 ROOT = Path(__file__).parents[1]
-HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
-METHODS = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum")  # conditioned on the preference
-TRAINED = (*METHODS, "eupg_fixed_lambda")
+GENERALIST = "boreal-generalist-v0"
 STUDIES = (
     "constant_plans",
     "training_gains",
@@ -55,8 +54,7 @@ class Job:
     @property
     def path(self) -> str:
         """The script's file, relative to the repository."""
-        folder = "analysis/studies" if self.is_study else "cleanrl_style" if self.trains else "baselines_heuristic"
-        return f"{folder}/{self.script}.py"
+        return f"analysis/studies/{self.script}.py" if self.is_study else METHODS[self.script].path
 
     @property
     def exists(self) -> bool:
@@ -76,7 +74,7 @@ class Job:
     @property
     def trains(self) -> bool:
         """Whether it trains an agent; else it evaluates a fixed strategy, or is a study."""
-        return self.script in TRAINED
+        return self.script in METHODS and METHODS[self.script].trains
 
     @property
     def arguments(self) -> list[str]:
@@ -140,8 +138,8 @@ def seeds_of(number: int, chosen: list[int] | None) -> list[int]:
 
 def main_table(seeds) -> list[Job]:
     """Heuristics and constant plans, then the three methods, a seed of all before the next."""
-    methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in METHODS]
-    fixed = [Job("main", script) for script in (*HEURISTICS, "constant_plans")]
+    methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in LEARNERS]
+    fixed = [Job("main", script) for script in (*STRATEGIES, "constant_plans")]
     return [*fixed, *methods, Job("main", "training_gains")]
 
 
@@ -188,8 +186,8 @@ def thaw_formulations(seeds) -> list[Job]:
 def balanced(seeds) -> list[Job]:
     """The three methods where both returns vary equally between policies."""
     env = {"env_id": "boreal-balanced-v0"}
-    return [Job("balanced", script, env) for script in HEURISTICS] + [
-        trained("balanced", script, seed, **env) for seed in seeds_of(5, seeds) for script in METHODS
+    return [Job("balanced", script, env) for script in STRATEGIES] + [
+        trained("balanced", script, seed, **env) for seed in seeds_of(5, seeds) for script in LEARNERS
     ]
 
 

@@ -6,35 +6,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis import experiments, metrics, runs
+from analysis import experiments, methods, metrics, runs
 from analysis.studies import stored
 
 STUDIES_DIR = Path("results/studies")
 QUICK_STUDIES_DIR = Path("results/quick/studies")
-
-#: Our scripts, and what the paper's tables call them (None: it has no such row).
-METHODS = {
-    "ppo_curriculum": "curriculum_ppo",
-    "ppo_gated": "ppo_gated",
-    "eupg_var_lambda": "eupg_variable_lambda",
-    "eupg_fixed_lambda": "fixed_weight_eupg",
-    "target_density": "target_density",
-    "conifer_restoration": "conifer_restoration",
-    "zero_change": "zero_density_change",
-    "plus_100": "plus_100_density",
-    "random_valid": None,
-}
-TITLES = {
-    "ppo_curriculum": "Curriculum PPO",
-    "ppo_gated": "PPO Gated",
-    "eupg_var_lambda": "Variable λ EUPG",
-    "eupg_fixed_lambda": "Fixed λ EUPG",
-    "target_density": "Target density 1000",
-    "conifer_restoration": "Conifer restoration",
-    "zero_change": "Zero change",
-    "plus_100": "+100 a year",
-    "random_valid": "Random",
-}
 
 
 @dataclass(frozen=True)
@@ -140,6 +116,10 @@ class Results:
     def is_papers(self, key: tuple) -> bool:
         """Whether a row is one of the paper's: no control, and not of the balanced environment."""
         return key[2] == "default" or any(job.row == key for job in self.jobs if job.experiment in ("main", "fixed"))
+
+    def paper_name(self, key: tuple) -> str | None:
+        """What the paper's tables call the method of a row; None if the row is not one of theirs."""
+        return methods.paper_name(key[0]) if self.is_papers(key) and key[1] == experiments.GENERALIST else None
 
     def is_trained(self, key: tuple) -> bool:
         """Whether a row is of a script that trains, by its jobs or its runs."""

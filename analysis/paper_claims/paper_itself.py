@@ -7,21 +7,13 @@ from math import factorial
 import numpy as np
 import pandas as pd
 
-from analysis import metrics
+from analysis import methods, metrics
 from analysis.paper_claims.claim import CONTRADICTS, UNTESTABLE, Answer, Row, claim, finding, short
 from analysis.tables.common import paper
 from analysis.tables.main_results import paper_rows
 
 TITLE = "The paper's tables against each other"
-NAMES = {
-    "curriculum_ppo": "Curriculum PPO",
-    "ppo_gated": "PPO Gated",
-    "eupg_variable_lambda": "Variable λ EUPG",
-    "target_density": "target density",
-    "conifer_restoration": "conifer restoration",
-    "zero_density_change": "zero change",
-    "plus_100_density": "+100 a year",
-}
+NAMES = {method.paper: method.title for method in methods.ROWS}
 # pairs of weights behind the percentages of violations, by the weights that the paper shows
 PAIRS = {"curriculum_ppo": 4, "fixed_weight_eupg": 4, "eupg_variable_lambda": 9, "ppo_gated": 5}
 
@@ -245,7 +237,7 @@ def violations_by_chance(evidence):
         chance = chance_of_at_most(printed[method], pairs)
         rows.append(
             Row(
-                f"{NAMES.get(method, 'Fixed λ EUPG')}, {pairs} pairs",
+                f"{NAMES[method]}, {pairs} pairs",
                 f"{short(printed[method])} %",
                 f"noise: {short(expected)} % on average; as few or fewer in {short(100 * chance)} % of cases",
             )

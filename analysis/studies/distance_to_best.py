@@ -22,7 +22,7 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import experiments, metrics, results, runs
+from analysis import experiments, methods, metrics, results, runs
 from analysis.studies import open_loop, stored
 from cleanrl_style import protocol
 from cleanrl_style.protocol import evaluation
@@ -331,7 +331,7 @@ def main(args: Args) -> None:
     table = pd.concat([table, constant.assign(**dict.fromkeys(AGENT[1:], ""))], ignore_index=True)
     todo = [
         (dict.fromkeys([*AGENT, "run"], "") | {"method": name}, (strategy(name), {}), weights)
-        for name in experiments.HEURISTICS
+        for name in methods.STRATEGIES
     ]
     for folder, config in agents(args.runs_dir or (experiments.QUICK_DIR if args.quick else runs.RUNS_DIR), plans):
         own = (config["arguments"]["preference"],) if "preference" in config["arguments"] else weights

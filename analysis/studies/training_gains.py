@@ -17,7 +17,8 @@ import numpy as np
 import pandas as pd
 
 import boreal_env
-from analysis import experiments, results
+from analysis import results
+from analysis.methods import LEARNERS
 from analysis.studies import open_loop, stored
 from cleanrl_style import protocol
 
@@ -36,7 +37,7 @@ class Args:
 
 def streams(found: results.Results) -> dict[tuple[int, int], int]:
     """(number of environments, training seed) of the main experiment's runs -> steps."""
-    runs = [one.runs[0] for script in experiments.METHODS for one in found.of("main", script)]
+    runs = [one.runs[0] for script in LEARNERS for one in found.of("main", script)]
     return {tuple(run.arguments[name] for name in STREAM): run.arguments["total_timesteps"] for run in runs}
 
 
@@ -96,7 +97,7 @@ def main(args: Args) -> None:
     found = results.Results.load(args.quick)
     wanted = streams(found)
     if not wanted:
-        sys.exit(f"error: no finished run; {found.first_job('main', experiments.METHODS[0]).command} makes the first")
+        sys.exit(f"error: no finished run; {found.first_job('main', LEARNERS[0]).command} makes the first")
     every = 1 if args.quick else EVERY
     path = found.studies_dir / "training_gains.csv"
     settings = {"every": every, "physics": open_loop.fingerprint()}

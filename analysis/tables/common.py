@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
+from analysis.experiments import GENERALIST  # noqa: F401
 from cleanrl_style import protocol
 from cleanrl_style.protocol import FLOAT_FORMAT
 
 PAPER_TABLES = Path(__file__).parents[1] / "paper_tables"
-GENERALIST = "boreal-generalist-v0"
 #: The first columns of a table with a row for each method.
 ROW_COLUMNS = {"method": "method", "environment": "environment", "setting": "setting", "seeds": "seeds"}
 

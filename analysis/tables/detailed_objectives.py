@@ -3,8 +3,7 @@
 import pandas as pd
 
 from analysis import metrics
-from analysis.results import METHODS
-from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Detailed objectives"
 COLUMNS = ROW_COLUMNS | {
@@ -40,9 +39,8 @@ def make(results) -> pd.DataFrame:
     rows = []
     for key, replicates in results.rows.items():
         tables = [by_weight(one) for one in replicates]
-        name = METHODS.get(key[0])
-        is_papers = results.is_papers(key) and key[1] == GENERALIST and (name, 0.0) in published.index
-        theirs = published.loc[name] if is_papers else published.iloc[:0]
+        name = results.paper_name(key)
+        theirs = published.loc[name] if (name, 0.0) in published.index else published.iloc[:0]
         ours = pd.concat(tables) if tables else pd.DataFrame()
         for weight in sorted({*ours.index, *(theirs.index if tables else ())}):
             at_weight = ours[ours.index == weight]

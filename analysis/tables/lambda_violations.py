@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.results import METHODS
-from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Lambda violations"
 COLUMNS = ROW_COLUMNS | {
@@ -59,8 +58,8 @@ def make(results) -> pd.DataFrame:
             continue
         table = pd.DataFrame([violations(one) for one in replicates], columns=names).astype(float)
         row = row_of(key, len(table)) | over_seeds(table.drop(columns="pairs")) | {"pairs": table.pairs.mean()}
-        name = METHODS.get(key[0])
-        if results.is_papers(key) and key[1] == GENERALIST and name in published.index:
+        name = results.paper_name(key)
+        if name in published.index:
             row["paper_violations_percent"] = published[name]
             row["paper_detail_violations_percent"] = details.get(name, np.nan)
         rows.append(row)

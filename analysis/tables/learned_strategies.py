@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from analysis.experiments import HEURISTICS, METHODS
-from analysis.results import METHODS as PAPER_NAMES
+from analysis.methods import LEARNERS, STRATEGIES
 from analysis.tables.common import ROW_COLUMNS, mean_of_years, over_seeds, paper, row_of
 
 TITLE = "Learned strategies"
@@ -51,10 +50,10 @@ def make(results) -> pd.DataFrame:
     published = paper("learned_strategies", index_col="method").add_prefix("paper_")
     columns = [name for name in COLUMNS if name not in ROW_COLUMNS and not name.startswith("paper_")]
     rows = []
-    for key, replicates in results.of_main_and_others((*METHODS, *HEURISTICS)).items():
+    for key, replicates in results.of_main_and_others((*LEARNERS, *STRATEGIES)).items():
         table = pd.DataFrame([numbers(one) for one in replicates], columns=columns).astype(float)
         row = row_of(key, len(table)) | over_seeds(table)
-        if PAPER_NAMES.get(key[0]) in published.index:
-            row |= published.loc[PAPER_NAMES[key[0]]].to_dict()
+        if results.paper_name(key) in published.index:
+            row |= published.loc[results.paper_name(key)].to_dict()
         rows.append(row)
     return pd.DataFrame(rows)

@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.results import METHODS
 from analysis.studies.constant_plans import as_evaluation
 from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
 from cleanrl_style.protocol.evaluation import EVAL_WEIGHTS
@@ -132,7 +131,7 @@ def make(results) -> pd.DataFrame:
         table = pd.DataFrame([run_metrics(*one) for one in evaluations[key]], columns=NUMBERS)
         row = row_of(key, len(table)) | over_seeds(table.drop(columns="sd_over_episodes"))
         row["sd_over_episodes"] = table.sd_over_episodes.mean()
-        if results.is_papers(key) and key[1] == GENERALIST and METHODS.get(key[0]) in published.index:
-            row |= published.loc[METHODS[key[0]]].to_dict()
+        if results.paper_name(key) in published.index:
+            row |= published.loc[results.paper_name(key)].to_dict()
         rows.append(row)
     return pd.DataFrame(rows)
