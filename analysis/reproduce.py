@@ -155,7 +155,7 @@ def finished_configs(*roots: Path) -> list[dict]:
     configs = []
     for folder in (folder for root in roots for folder in runs.run_folders(root)):
         try:
-            configs.append(runs.read_config(folder) if runs.table_path(folder, "evaluation") else None)
+            configs.append(runs.read_config(folder) if runs.is_finished(folder) else None)
         except ValueError as error:
             print(f"{folder}: {error}", file=sys.stderr)
     return [config for config in configs if config]

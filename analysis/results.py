@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from analysis import experiments, methods, metrics, runs
+from analysis import experiments, methods, metrics, reduction, runs
 from analysis.studies import stored
 
 STUDIES_DIR = Path("results/studies")
@@ -25,10 +26,34 @@ class Replicate:
         """Its runs, each a replicate of its own."""
         return [Replicate([run], run.evaluation, None) for run in self.runs]
 
-    def years(self, variables: list[str] | None = None) -> pd.DataFrame:
-        """Annual record of the sampled policy: means over the episodes, of the weights that are kept."""
-        table = pd.concat([run.years for run in self.runs if run.years is not None], ignore_index=True)
-        return table if variables is None else table[table.variable.isin(variables)]
+    @property
+    def years(self) -> pd.DataFrame:
+        """Annual record, a row a kept weight and year: means over the episodes of the columns of `reduction.ANNUAL`."""
+        return self._joined("years", reduction.ANNUAL)
+
+    @property
+    def last_year(self) -> pd.DataFrame:
+        """Percentiles over the episodes in the last year, a row a kept weight and variable of `reduction.SPREAD`."""
+        return self._joined("last_year", ("p10", "p50", "p90"))
+
+    def _joined(self, name: str, columns) -> pd.DataFrame:
+        """A table of all its runs; without rows if none has it, which keeps no annual record."""
+        tables = [run.tables[name] for run in self.runs if len(run.tables.get(name, ()))]
+        return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["year", *columns], dtype=float)
+
+    def mean_of_years(self, variables) -> dict[str, float]:
+        """Means over the years and the kept weights of columns of the annual record."""
+        unknown = [name for name in variables if name not in reduction.ANNUAL]
+        if unknown:
+            raise ValueError(
+                f"{unknown[0]}: no column of the annual record that is kept (analysis/reduction.py, ANNUAL)"
+            )
+        return self.years.reindex(columns=list(variables)).mean().to_dict()
+
+
+def by_year(replicates: list[Replicate], variable: str) -> np.ndarray:
+    """A column of the annual record, averaged over the kept weights, (replicates, years)."""
+    return np.array([one.years.groupby("year")[variable].mean().to_numpy() for one in replicates])
 
 
 class Results:

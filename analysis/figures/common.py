@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from analysis import metrics
 from analysis.methods import LEARNERS, METHODS
+from analysis.results import by_year
 from cleanrl_style import protocol
 
 STYLE = {
@@ -28,7 +29,6 @@ STYLE = {
     "pdf.fonttype": 42,
 }
 WEIGHT_COLOURS = "viridis"
-BINS = 40  # of a learning curve
 SEEDS_95 = "curves and bands: interquartile mean over training seeds and its 95 % interval (none with one seed)"
 
 
@@ -123,35 +123,23 @@ def band(ax, x, curves, colour, label, style="-", marker=None) -> None:
         ax.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0)
 
 
-def binned(episodes: pd.DataFrame, column: str, steps: int, statistic: str = "mean", bins: int = BINS) -> np.ndarray:
-    """A statistic of the training episodes that ended in each of equal parts of the training, (bins,)."""
-    number = np.minimum((episodes.global_step - 1) * bins // steps, bins - 1)
-    return episodes[column].groupby(number).agg(statistic).reindex(range(bins)).to_numpy()
-
-
-def training_curve(ax, tables, column: str, steps: int, colour, label, statistic="mean", bins=BINS, **kwargs) -> None:
-    """A column of training episodes against environment steps; one table a replicate."""
-    curves = np.array([binned(table, column, steps, statistic, bins) for table in tables])
+def training_curve(ax, curves, steps: int, colour, label, **kwargs) -> None:
+    """Curves (replicates, parts of the training) against steps, but for parts in which one has no episodes."""
+    curves = np.asarray(curves)
     known = ~np.isnan(curves).any(axis=0)
-    x = (np.arange(bins) + 0.5) * steps / bins / 1000
+    x = (np.arange(curves.shape[1]) + 0.5) * steps / curves.shape[1] / 1000
     band(ax, x[known], curves[:, known], colour, label, **kwargs)
 
 
-def learning_curve(ax, replicates, column: str, colour, label: str, **kwargs) -> None:
+def steps_of(runs) -> int:
+    """Environment steps of the longest training."""
+    return max(run.arguments["total_timesteps"] for run in runs)
+
+
+def learning_curve(ax, replicates, column: str, colour, label: str, statistic: str = "mean") -> None:
     """A column of the training episodes of replicates of one run each."""
     runs = [one.runs[0] for one in replicates]
-    steps = max(run.arguments["total_timesteps"] for run in runs)
-    training_curve(ax, [run.episodes for run in runs], column, steps, colour, label, **kwargs)
-
-
-def by_year(replicates, variable: str) -> np.ndarray:
-    """A column of the annual record, averaged over the kept weights, (replicates, years)."""
-
-    def of_one(one):
-        years = one.years([variable])
-        return years.groupby("year")["mean"].mean().to_numpy()
-
-    return np.array([of_one(one) for one in replicates])
+    training_curve(ax, [run.course(column, statistic) for run in runs], steps_of(runs), colour, label)
 
 
 def year_curve(ax, replicates, variable: str, colour, label: str, style="-") -> None:

@@ -1,8 +1,10 @@
 """Stems by age class through the 50 years, and the conifer fractions of training and evaluation."""
 
 import numpy as np
+import pandas as pd
 
 from analysis.figures.common import SEEDS_95, finish, learners, legend, letter, year_curve
+from analysis.reduction import BINS
 
 SIZE = (7, 7)
 CAPTION = (
@@ -38,15 +40,17 @@ def draw(figure, results) -> None:
 
     training, evaluation = axes[5:]
     for method in learners(training, results):
-        episodes = [one.runs[0].episodes for one in results.of("main", method.script)]
-        last = [table.final_conifer_fraction[table.global_step > 0.8 * table.global_step.max()] for table in episodes]
-        training.hist(np.concatenate(last), np.linspace(0, 1, 41), density=True, histtype="step", color=method.colour)
+        stands = pd.concat([one.runs[0].tables["composition"] for one in results.of("main", method.script)])
+        edges = np.linspace(0, 1, BINS + 1)
+        middles = stands.conifer_fraction + edges[1] / 2
+        number = {"weights": stands.episodes, "density": True}
+        training.hist(middles, edges, **number, histtype="step", color=method.colour)
     finish(training, xlabel="conifer fraction after 50 years", ylabel="density of episodes")
     height = 0
     for method in learners(evaluation, results):
         for one in results.of("main", method.script):
-            years = one.years(["conifer_fraction"])
-            for row in years[years.year == years.year.max()].sort_values("preference").itertuples():
+            last = one.last_year[one.last_year.variable == "conifer_fraction"]
+            for row in last.sort_values("preference").itertuples():
                 evaluation.plot([row.p10, row.p90], [height, height], color=method.colour, linewidth=1)
                 evaluation.plot(row.p50, height, "|", color=method.colour, markersize=4)
                 height -= 1

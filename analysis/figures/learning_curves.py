@@ -1,5 +1,7 @@
 """Whether the methods learn: returns and gains in training, against fixed strategies and the best constant plan."""
 
+import numpy as np
+
 from analysis import metrics
 from analysis.figures.common import (
     SEEDS_95,
@@ -10,6 +12,7 @@ from analysis.figures.common import (
     legend,
     no_data,
     panels,
+    steps_of,
     training_curve,
 )
 from analysis.methods import LEARNERS, METHODS, STRATEGIES
@@ -52,11 +55,13 @@ def draw(figure, results) -> None:
 
 def gain_curve(ax, replicates, nothing, column: str, colour) -> None:
     """A gain of the training episodes against environment steps; none until every seed has it: a part may mislead."""
-    found = [(one.runs[0], gains(one.runs[0], nothing)) for one in replicates]
-    if any(table is None for _, table in found):
+    runs = [one.runs[0] for one in replicates]
+    tables, steps = [gains(run, nothing) for run in runs], steps_of(runs)
+    if any(table is None for table in tables):
         return
-    steps = max(run.arguments["total_timesteps"] for run, _ in found)
-    training_curve(ax, [table for _, table in found], column, steps, colour, None, bins=PARTS)
+    parts = [np.minimum((table.global_step - 1) * PARTS // steps, PARTS - 1) for table in tables]
+    curves = [table[column].groupby(part).mean() for table, part in zip(tables, parts, strict=True)]
+    training_curve(ax, [curve.reindex(range(PARTS)) for curve in curves], steps, colour, None)
 
 
 def baselines(results, nothing) -> list[tuple]:

@@ -5,8 +5,6 @@ import numpy as np
 from analysis.figures.common import (
     RETURNS,
     SEEDS_95,
-    binned,
-    by_year,
     finish,
     learners,
     legend,
@@ -15,6 +13,8 @@ from analysis.figures.common import (
     season_curves,
 )
 from analysis.methods import LEARNERS
+from analysis.reduction import AGE_CLASSES, SPECIES
+from analysis.results import by_year
 
 SIZE = (7, 5.4)
 CAPTION = (
@@ -23,7 +23,6 @@ CAPTION = (
 )
 PARTS = 8  # of the training
 GROUP, BARS = 0.81, 0.75  # width of a class's bars, with the gaps between them and without
-CLASSES = ("seedling", "sapling", "young", "mature", "old")
 
 
 def draw(figure, results) -> None:
@@ -33,11 +32,8 @@ def draw(figure, results) -> None:
     )
     for method in learners(training, results):
         runs = [one.runs[0] for one in results.of("main", method.script)]
-        steps = max(run.arguments["total_timesteps"] for run in runs)
-        thaw, carbon = (
-            np.mean([binned(run.episodes, name, steps, bins=PARTS) for run in runs], axis=0)
-            for name in ("thaw_return", "carbon_return")
-        )
+        courses = [[run.course(f"{name}_return", parts=PARTS) for run in runs] for name in ("thaw", "carbon")]
+        thaw, carbon = (np.mean(one, axis=0) for one in courses)
         known = np.flatnonzero(~np.isnan(thaw))
         training.plot(thaw[known], carbon[known], color=method.colour, linewidth=0.7, alpha=0.6)
         training.plot(thaw[known[-1]], carbon[known[-1]], method.marker, color=method.colour, label=method.title)
@@ -52,19 +48,19 @@ def draw(figure, results) -> None:
             [
                 sum(
                     by_year(results.of("main", method.script), f"{species}_{age}_stems_ha")[:, -1]
-                    for species in ("conifer", "deciduous")
+                    for species in SPECIES
                 )
-                for age in CLASSES
+                for age in AGE_CLASSES
             ]
         )
         ages.bar(
-            np.arange(len(CLASSES)) + GROUP / len(LEARNERS) * (k - (len(LEARNERS) - 1) / 2),
+            np.arange(len(AGE_CLASSES)) + GROUP / len(LEARNERS) * (k - (len(LEARNERS) - 1) / 2),
             stems.mean(axis=1),
             BARS / len(LEARNERS),
             yerr=stems.std(axis=1),
             color=method.colour,
             error_kw={"linewidth": 0.6},
         )
-    ages.set_xticks(range(len(CLASSES)), CLASSES)
+    ages.set_xticks(range(len(AGE_CLASSES)), AGE_CLASSES)
     finish(ages, ylabel="stems/ha")
     legend(figure, [training, season])

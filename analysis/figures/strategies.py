@@ -32,10 +32,7 @@ def draw(figure, results) -> None:
         finish(ax, xlabel="year", ylabel=label)
     for method in learners(composition, results):
         for one in results.of("main", method.script):
-            years = one.years(["density_stems_ha", "conifer_fraction"])
-            last = years[years.year == years.year.max()].pivot(
-                index="preference", columns="variable", values=["p10", "p50", "p90"]
-            )
+            last = one.last_year.pivot(index="preference", columns="variable", values=["p10", "p50", "p90"])
             x, y = last["p50"].density_stems_ha, last["p50"].conifer_fraction
             spread = {
                 name: [last["p50"][column] - last["p10"][column], last["p90"][column] - last["p50"][column]]

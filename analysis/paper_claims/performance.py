@@ -253,8 +253,7 @@ def thaw_is_positive(evidence):
 
 def net_cooling(one) -> dict:
     """Heat through the boundary out of the ground less into it [MJ m-2 yr-1], lowest of the kept weights."""
-    years = one.years(["boundary_cooling_mj_m2", "boundary_warming_mj_m2"])
-    means = years.groupby(["preference", "variable"])["mean"].mean().unstack()
+    means = one.years.groupby("preference")[["boundary_cooling_mj_m2", "boundary_warming_mj_m2"]].mean()
     return {"cooling": (means.boundary_cooling_mj_m2 - means.boundary_warming_mj_m2).min()}
 
 

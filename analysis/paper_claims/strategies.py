@@ -3,7 +3,6 @@
 import pandas as pd
 
 from analysis import methods, metrics
-from analysis.figures.common import by_year
 from analysis.paper_claims.claim import (
     CONTRADICTS,
     LEAST,
@@ -23,6 +22,7 @@ from analysis.paper_claims.claim import (
 from analysis.paper_claims.evidence import difference, first_and_last, only, optional, seeds
 from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED
 from analysis.paper_claims.preference import APART, change
+from analysis.results import by_year
 from analysis.tables.common import paper
 from analysis.tables.learned_strategies import numbers
 
@@ -185,9 +185,8 @@ def curriculum_protects(evidence):
 
 def older_deciduous(one) -> dict:
     """Mature and old deciduous stems in the last year, mean over the kept weights."""
-    years = one.years(OLDER)
-    last = years[years.year == years.year.max()]
-    return {"stems": last.groupby("variable")["mean"].mean().sum()}
+    last = one.years[one.years.year == one.years.year.max()]
+    return {"stems": last[OLDER].mean().sum()}
 
 
 @claim(

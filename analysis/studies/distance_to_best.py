@@ -260,7 +260,7 @@ def agents(folder: Path, sites) -> list[tuple[Path, dict]]:
     """
     found = []
     for path in runs.run_folders(folder):
-        if not (path / "checkpoint.pt").exists() or runs.table_path(path, "evaluation") is None:
+        if not (path / "checkpoint.pt").exists() or not runs.is_finished(path):
             continue
         try:
             config = runs.read_config(path)

@@ -19,10 +19,10 @@ import pandas as pd
 import boreal_env
 from analysis import results
 from analysis.methods import LEARNERS
+from analysis.reduction import EVERY
 from analysis.studies import open_loop, stored
 from cleanrl_style import protocol
 
-EVERY = 8
 STREAM = ["num_envs", "seed"]  # what fixes the episodes of a training in generalist mode
 EPISODE = [*STREAM, "env", "global_step"]
 
@@ -78,7 +78,7 @@ def gains(run, nothing: pd.DataFrame) -> pd.DataFrame | None:
     nothing : the study's table. Columns: global_step, carbon_gain, thaw_gain, scalarized_gain.
     """
     keys = {name: run.arguments[name] for name in STREAM}
-    both = run.episodes.assign(**keys).merge(nothing, on=EPISODE, suffixes=("", "_nothing"))
+    both = run.tables["sample"].assign(**keys).merge(nothing, on=EPISODE, suffixes=("", "_nothing"))
     if both.empty:
         return None
     carbon, thaw = (both[f"{name}_return"] - both[f"{name}_return_nothing"] for name in ("carbon", "thaw"))

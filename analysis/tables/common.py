@@ -35,12 +35,6 @@ def over_seeds(values: pd.DataFrame) -> dict:
     return row
 
 
-def mean_of_years(replicate, variables: list[str]) -> dict:
-    """Mean over the years and the kept weights of columns of the annual record, sampled policy."""
-    table = replicate.years(variables)
-    return table.groupby("variable")["mean"].mean().to_dict()
-
-
 def cell(row: pd.Series, name: str) -> str:
     """A value as text; a number with its 95 % interval, if there is one."""
     value, low, high = (row.get(key, np.nan) for key in (name, f"{name}_low", f"{name}_high"))

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from analysis.methods import LEARNERS, STRATEGIES
-from analysis.tables.common import ROW_COLUMNS, mean_of_years, over_seeds, paper, row_of
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Learned strategies"
 YEARS = {
@@ -37,11 +37,10 @@ COLUMNS = ROW_COLUMNS | {
 
 def numbers(one) -> dict:
     """Means over the episodes of one run: 50 years for the stand, all weights for the returns."""
-    row = {YEARS[name]: value for name, value in mean_of_years(one, list(YEARS)).items()}
-    years = one.years(["density_stems_ha", "conifer_fraction"])
-    last = years[years.year == years.year.max()].groupby("variable")["mean"].mean()
-    # a run that was evaluated at none of the kept weights has no years here
-    row |= {"final_density": last.get("density_stems_ha"), "final_conifer_fraction": last.get("conifer_fraction")}
+    row = {YEARS[name]: value for name, value in one.mean_of_years(YEARS).items()}
+    # of a run that was evaluated at none of the kept weights these are not numbers
+    last = one.years[one.years.year == one.years.year.max()]
+    row |= {"final_density": last.density_stems_ha.mean(), "final_conifer_fraction": last.conifer_fraction.mean()}
     return row | {"carbon": one.evaluation.carbon_return.mean(), "thaw": one.evaluation.thaw_return.mean()}
 
 

@@ -21,7 +21,7 @@ PHASES = ("rollout", "update", "evaluation")
 
 def hours(run) -> dict:
     """Hours of a run by phase; `training` is rollouts and updates."""
-    by_phase = run.timing.groupby("phase").seconds.sum().reindex([*PHASES, "environment"]) / 3600
+    by_phase = run.tables["timing"].set_index("phase").seconds.reindex([*PHASES, "environment"]) / 3600
     training = by_phase["rollout"] + by_phase["update"]
     return {
         "training": training,
