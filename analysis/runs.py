@@ -84,13 +84,7 @@ def identity(config: dict) -> str:
 
 def is_finished(folder: Path) -> bool:
     """Whether a folder's run is finished: it has its evaluation, or is archived."""
-    return (folder / ARCHIVED).exists() or table_path(folder, "evaluation") is not None
-
-
-def table_path(folder: Path, name: str) -> Path | None:
-    """A table of a run of runs/, plain or compressed; None if it has none of that name."""
-    candidates = (folder / f"{name}.csv", folder / f"{name}.csv.gz")
-    return next((path for path in candidates if path.exists()), None)
+    return (folder / ARCHIVED).exists() or (folder / "evaluation.csv").exists()
 
 
 def read_archived(folder: Path) -> dict[str, pd.DataFrame]:
@@ -106,16 +100,14 @@ def read_whole(folder: Path, trained: bool) -> dict[str, pd.DataFrame]:
     """The tables of a run of runs/; ValueError says which is missing or cannot be read."""
     tables = {}
     for name in ("evaluation", "timing", "evaluation_years", *(["episodes"] if trained else [])):
-        path = table_path(folder, name)
-        if path is None and name == "evaluation":
-            raise ValueError("unfinished: it has no evaluation.csv")
-        if path is None and name == "evaluation_years":
+        path = folder / f"{name}.csv"
+        if not path.exists() and name == "evaluation_years":
             continue  # its environment keeps no annual record
-        if path is None:
-            raise ValueError(f"partial: it has no {name}.csv")
+        if not path.exists():
+            raise ValueError(f"{'unfinished' if name == 'evaluation' else 'partial'}: it has no {name}.csv")
         try:
             tables[name] = pd.read_csv(path)
-        except (ValueError, OSError, EOFError, zlib.error) as error:
+        except (ValueError, OSError) as error:
             raise ValueError(f"damaged: {path.name} ({error})") from error
     return tables
 
