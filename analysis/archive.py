@@ -12,8 +12,9 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis import experiments, reduction, runs
+from analysis import experiments, paths, reduction, runs
 from cleanrl_style import protocol
+from cleanrl_style.protocol.run_folder import folder_name
 
 POLICY = "policy.pt"
 
@@ -22,9 +23,9 @@ POLICY = "policy.pt"
 class Args:
     """Archives the finished runs."""
 
-    runs_dir: Path = runs.RUNS_DIR
+    runs_dir: Path = paths.runs()
     """folder that holds the runs, at any depth"""
-    archive_dir: Path = runs.ARCHIVE_DIR
+    archive_dir: Path = paths.archive()
     """folder of the archive"""
 
 
@@ -39,14 +40,9 @@ def write_tables(path: Path, run: runs.Run) -> None:
 
 def folder_of(config: dict, archive_dir: Path) -> Path:
     """Where a run is archived: as `runs/` has it by default, wherever the run itself lies."""
-    arguments, changed = config["arguments"], config["not_default"]
-    name = "-".join(
-        [
-            arguments["env_id"].split(":")[-1].replace("/", "-"),
-            *(f"{name}={runs.as_text(value)}" for name, value in changed.items()),
-        ]
-    )
-    return archive_dir / config["script"] / name / f"seed{arguments['seed']}"
+    arguments = config["arguments"]
+    changed = {name: tuple(v) if isinstance(v, list) else v for name, v in config["not_default"].items()}
+    return archive_dir / config["script"] / folder_name(arguments["env_id"], changed) / f"seed{arguments['seed']}"
 
 
 def archive_run(run: runs.Run, archive_dir: Path, jobs: list[experiments.Job]) -> bool:

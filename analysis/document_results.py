@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import experiments, methods, metrics, runs
+from analysis import experiments, methods, metrics, paths
 from analysis.results import Results
 from analysis.tables import distance_to_best, main_results, single_sites
 from analysis.tables.common import GENERALIST, over_seeds
@@ -40,7 +40,7 @@ COLUMNS = ("carbon_0", "carbon_1", "thaw_0", "thaw_1", "scalarized", "gain_scala
 class Args:
     """Writes the results of the archived runs into the documents."""
 
-    runs_dir: tuple[Path, ...] = (runs.ARCHIVE_DIR,)
+    runs_dir: tuple[Path, ...] = (paths.archive(),)
     """folders that hold the runs, at any depth: the archive, so that the documents show what a clone has"""
     root: Path = Path()
     """folder of README.md and docs/"""
@@ -86,7 +86,7 @@ def rows_of(results: Results, script: str, environment: str | None = None) -> li
     published = main_results.paper_rows().paper_scalarized
     found = [
         (key, [(one.evaluation, one.gains) for one in replicates])
-        for key, replicates in results.rows.items()
+        for key, replicates in results.rows_of_two_objectives().items()
         if key[0] == script and replicates and environment in (None, key[1])
     ]
     titled = []

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import experiments, methods, metrics, reduction, runs
+from analysis import experiments, methods, metrics, paths, reduction, runs
 from analysis.studies import stored
 
-STUDIES_DIR = Path("results/studies")
-QUICK_STUDIES_DIR = Path("results/quick/studies")
+PAIR = ["carbon", "thaw"]  # the paper's objectives
 
 
 @dataclass(frozen=True)
@@ -56,6 +55,12 @@ def by_year(replicates: list[Replicate], variable: str) -> np.ndarray:
     return np.array([one.years.groupby("year")[variable].mean().to_numpy() for one in replicates])
 
 
+def weights_of(arguments: dict) -> tuple | None:
+    """The one preference that an agent is trained for; None of an agent of all."""
+    preference = arguments.get("preference")
+    return None if preference is None else tuple(np.ravel(preference).tolist())
+
+
 class Results:
     """Runs below some folders by row, and the tables of the studies.
 
@@ -73,10 +78,8 @@ class Results:
 
         The archive comes before the runs themselves, so that a clone's tables have the same digits.
         """
-        if quick:
-            default = experiments.QUICK_ARCHIVE_DIR, experiments.QUICK_DIR
-            return Results(roots or default, experiments.quick_jobs(), QUICK_STUDIES_DIR)
-        return Results(roots or (runs.ARCHIVE_DIR, runs.RUNS_DIR), experiments.jobs(), STUDIES_DIR)
+        jobs = experiments.quick_jobs() if quick else experiments.jobs()
+        return Results(roots or (paths.archive(quick), paths.runs(quick)), jobs, paths.studies(quick))
 
     @cached_property
     def rows(self) -> dict[tuple, list[Replicate]]:
@@ -92,14 +95,14 @@ class Results:
 
     def _complete(self, key, replicate, its_runs) -> bool:
         """Whether one agent a weight is there for every weight of the experiment; if not, it is named."""
-        wanted = {job.flags["preference"] for job in self.jobs if job.row == key and "preference" in job.flags}
-        lacking = wanted - {run.arguments.get("preference") for run in its_runs}
+        wanted = {weights_of(job.flags) for job in self.jobs if job.row == key and "preference" in job.flags}
+        lacking = wanted - {weights_of(run.arguments) for run in its_runs}
         if lacking:
             seed, site_seed = replicate
             site = "" if site_seed is None else f", site seed {site_seed}"
             self.left_out.append(
                 f"{key[0]}, {key[1]}, seed {seed}{site}: partial, without the agents of the weights "
-                f"{', '.join(f'{weight:g}' for weight in sorted(lacking))}"
+                f"{', '.join(map(runs.as_text, sorted(lacking)))}"
             )
         return not lacking
 
@@ -119,6 +122,15 @@ class Results:
         longest = max(same, key=len, default=None)
         known = longest is not None and set(evaluation.seed) <= set(longest.seed)
         return metrics.gains(evaluation, longest) if known else None
+
+    def objectives(self, env_id: str) -> list[str]:
+        """An environment's objectives, by its runs; the paper's two without a run."""
+        run = next((run for run in self.runs if run.arguments["env_id"] == env_id), None)
+        return PAIR if run is None else metrics.objectives_of(run.evaluation.columns)
+
+    def rows_of_two_objectives(self) -> dict[tuple, list[Replicate]]:
+        """The rows of environments that pay carbon and thaw, which the paper's tables are about."""
+        return {key: replicates for key, replicates in self.rows.items() if self.objectives(key[1]) == PAIR}
 
     def of(self, experiment: str, script: str, **flags) -> list[Replicate]:
         """Replicates of an experiment's row: the first of its jobs with these flags says which; none without a job."""

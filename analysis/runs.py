@@ -12,12 +12,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import reduction
+from analysis import paths, reduction
 from cleanrl_style.protocol import fronts
-from cleanrl_style.protocol.evaluation import MODES
 
-RUNS_DIR, ARCHIVE_DIR = Path("runs"), Path("results/runs")
-QUICK = "quick"  # folder of runs/ with the runs of `reproduce.py --quick`, which are no results
+SITE_SPECIFIC = "site-specific"  # the mode in which all episodes are of one site and weather
 ARCHIVED = "tables.zip"  # the reduced tables of an archived run
 
 # Arguments that do not make another row: what tells its runs apart, what the row has a column for, and the output.
@@ -55,7 +53,7 @@ class Run:
     @property
     def setting(self) -> str:
         """What is not default in the run, but for what tells replicates apart: runs that agree in it are one row."""
-        return setting(self.config["not_default"], self.arguments["env_id"])
+        return setting(self.config["not_default"], self.arguments["mode"])
 
     @property
     def share_selected(self) -> float:
@@ -64,17 +62,17 @@ class Run:
         return row.selected / row.episodes
 
 
-def setting(not_default: dict, env_id: str) -> str:
+def setting(not_default: dict, mode: str) -> str:
     """name=value of the arguments that make a row, "default" if there are none; which single site, makes none."""
     items = {name: value for name, value in not_default.items() if name not in NOT_A_SETTING}
-    if not_default.get("site_seed") is not None and MODES.get(env_id) != "site-specific":
+    if not_default.get("site_seed") is not None and mode != SITE_SPECIFIC:
         items["site_seed"] = "one"
     return ", ".join(f"{name}={as_text(value)}" for name, value in sorted(items.items())) or "default"
 
 
 def as_text(value) -> str:
     """An argument as rows and folders name it."""
-    return ",".join(f"{v:g}" for v in value) if isinstance(value, (list, tuple)) else str(value)
+    return ",".join(f"{v:g}" for v in np.ravel(value)) if isinstance(value, (list, tuple)) else str(value)
 
 
 def identity(config: dict) -> str:
@@ -117,7 +115,7 @@ def read_config(folder: Path) -> dict:
     try:
         config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
         config["script"], config["not_default"]
-        for name in ("env_id", "seed", "eval_weights", "eval_episodes", "thaw_formulation", "site_seed"):
+        for name in ("env_id", "mode", "seed", "eval_weights", "eval_episodes", "thaw_formulation", "site_seed"):
             config["arguments"][name]
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"damaged: config.json ({error!r})") from error
@@ -148,9 +146,7 @@ def check(evaluation: pd.DataFrame, arguments: dict) -> None:
     if missing:
         raise ValueError(f"damaged: evaluation.csv with the returns of {objectives} lacks the column {missing[0]}")
     evaluation = evaluation[evaluation.policy == reduction.PRIMARY]
-    # a fixed-weight agent is evaluated at its own weight alone
-    weights = [arguments["preference"]] if "preference" in arguments else arguments["eval_weights"]
-    expected = len(weights) * arguments["eval_episodes"]
+    expected = len(arguments["eval_weights"]) * arguments["eval_episodes"]
     if len(evaluation) != expected:
         raise ValueError(
             f"damaged: evaluation.csv has {len(evaluation)} episodes of the {reduction.PRIMARY} policy, not {expected}"
@@ -162,7 +158,7 @@ def check(evaluation: pd.DataFrame, arguments: dict) -> None:
 def run_folders(root: Path) -> list[Path]:
     """Folders below `root` that hold a config.json, in order; those of `reproduce.py --quick` only if asked for."""
     folders = sorted(path.parent for path in root.rglob("config.json"))
-    return [folder for folder in folders if folder.relative_to(root).parts[:1] != (QUICK,)]
+    return [folder for folder in folders if folder.relative_to(root).parts[:1] != (paths.QUICK,)]
 
 
 def read_runs(*roots: Path) -> tuple[list[Run], list[str]]:

@@ -68,7 +68,7 @@ def scalarised(evidence):
     rows, same = [], []
     for method, table in details().items():
         printed = paper("main_results", index_col="method").scalarized_mean[method]
-        ours = metrics.scalarize(table.carbon_mean, table.thaw_mean, table.lambda_carbon).mean()
+        ours = metrics.scalarize(front(table), metrics.pair(table.lambda_carbon)).mean()
         rows.append(Row(f"scalarised, {NAMES[method]}", f"{short(printed)} printed", f"{short(ours)} from its details"))
         same.append(abs(ours - printed) <= 0.0501)
     return finding(rows, Answer(all(same), "all agree within the rounding of one decimal"), CONTRADICTS)
@@ -83,9 +83,9 @@ def scalarised(evidence):
 def spreads(evidence):
     rows, possible = [], []
     for method, table in details().items():
-        w = table.lambda_carbon
-        most = metrics.scalarize(table.carbon_std, table.thaw_std, w)
-        means = metrics.scalarize(table.carbon_mean, table.thaw_mean, w)
+        weights = metrics.pair(table.lambda_carbon)
+        most = metrics.scalarize(table[["carbon_std", "thaw_std"]].to_numpy(), weights)
+        means = metrics.scalarize(front(table), weights)
         bound = np.sqrt((most**2).mean() + means.var(ddof=0))
         printed = paper("main_results", index_col="method").scalarized_std[method]
         rows.append(
@@ -110,7 +110,7 @@ def spreads(evidence):
 def heuristic_hypervolumes(evidence):
     table, rows, possible = paper("main_results"), [], []
     for row in table[table.kind == "heuristic"].itertuples():
-        side = max(row.scalarized_mean - metrics.REFERENCE_POINT[0], 0.0)
+        side = max(row.scalarized_mean - metrics.REFERENCE_POINT, 0.0)
         rows.append(
             Row(
                 f"hypervolume, {NAMES[row.method]} (scalarised {short(row.scalarized_mean)})",

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 import boreal_env
-from analysis import results
+from analysis import metrics, results
 from analysis.methods import LEARNERS
 from analysis.reduction import EVERY
 from analysis.studies import open_loop, stored
@@ -81,15 +81,11 @@ def gains(run, nothing: pd.DataFrame) -> pd.DataFrame | None:
     both = run.tables["sample"].assign(**keys).merge(nothing, on=EPISODE, suffixes=("", "_nothing"))
     if both.empty:
         return None
-    carbon, thaw = (both[f"{name}_return"] - both[f"{name}_return_nothing"] for name in ("carbon", "thaw"))
-    return pd.DataFrame(
-        {
-            "global_step": both.global_step,
-            "carbon_gain": carbon,
-            "thaw_gain": thaw,
-            "scalarized_gain": protocol.scalarize(carbon, thaw, both.preference),
-        }
-    )
+    names = ("carbon", "thaw")
+    gained = np.column_stack([both[f"{name}_return"] - both[f"{name}_return_nothing"] for name in names])
+    table = pd.DataFrame(gained, columns=[f"{name}_gain" for name in names])
+    scalarized = protocol.scalarize(gained, metrics.pair(both.preference))
+    return table.assign(global_step=both.global_step, scalarized_gain=scalarized)
 
 
 def main(args: Args) -> None:

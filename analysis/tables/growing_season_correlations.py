@@ -56,12 +56,7 @@ def pair_effects(pairs: pd.DataFrame | None, variable: str) -> dict:
     """Mean effect of a longer season over the sites, upper less lower, with its 95 % interval."""
     row = {}
     for name, pair in SEASON_PAIRS.items() if pairs is not None else ():
-        mean, half_width = metrics.mean_interval(effects(pairs, pair, variable))
-        row |= {
-            f"{name}_effect": mean,
-            f"{name}_effect_low": mean - half_width,
-            f"{name}_effect_high": mean + half_width,
-        }
+        row |= metrics.with_interval(f"{name}_effect", effects(pairs, pair, variable))
     return row
 
 

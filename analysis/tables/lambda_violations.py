@@ -1,6 +1,7 @@
 """Adjacent pairs of weights where carbon falls or thaw rises as the carbon weight rises.
 
-Beside them what a policy that ignores the preference would show: the same points in an order drawn at random.
+Of two objectives: the weights of more have no neighbours. Beside them what a policy that ignores the preference would
+show: the same points in an order drawn at random.
 """
 
 import numpy as np
@@ -53,7 +54,7 @@ def make(results) -> pd.DataFrame:
         )
     ]
     rows = []
-    for key, replicates in results.rows.items():
+    for key, replicates in results.rows_of_two_objectives().items():
         if not results.is_trained(key):
             continue
         table = pd.DataFrame([violations(one) for one in replicates], columns=names).astype(float)

@@ -1,14 +1,12 @@
 """Time and memory: training from the runs' timing.csv, the rest from results/benchmark.csv, beside the paper's."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 
+from analysis import paths
 from analysis.tables.common import over_seeds, paper
 
 TITLE = "Runtime"
-BENCHMARK = Path("results/benchmark.csv")
 COLUMNS = {"quantity": "quantity", "unit": "unit", "seeds": "runs", "ours": "ours", "paper": "paper", "source": "from"}
 TRAINED = {  # our row -> experiment, script, the paper's row
     "EUPG, generalist": ("main", "eupg_var_lambda", "training_generalist_300k_steps"),
@@ -61,8 +59,9 @@ def make(results) -> pd.DataFrame:
                     **row,
                 }
             )
-    if BENCHMARK.exists():
-        for row in pd.read_csv(BENCHMARK).itertuples():
+    benchmark = paths.results() / "benchmark.csv"
+    if benchmark.exists():
+        for row in pd.read_csv(benchmark).itertuples():
             rows.append(
                 {
                     "quantity": row.what,
