@@ -1,81 +1,67 @@
-"""Copies what tables and figures read of every finished run into results/runs, compressed, the same bytes every time.
+"""Puts what tables, figures and claims read of every finished run into results/runs, the same bytes every time.
 
     python analysis/archive.py [--runs-dir runs] [--archive-dir results/runs]
 
-Kept of a run: config.json as it is; the evaluation, updates and timing, every row; of the training episodes every
-k-th, with the least k that leaves at most 6000 (all of 300,000 steps); of the annual record the sampled policy at the
-weights 0, 0.5 and 1. Numbers have six significant digits, seeds all of theirs.
+A run's folder there has its config.json as it is, tables.zip with the tables that `analysis/reduction.py` names, and,
+of the runs of the main experiment, policy.pt: the agent, which `cleanrl_style.protocol.load_agent` loads.
 """
 
-import gzip
 import shutil
 import sys
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import pandas as pd
-
-from analysis import runs
+from analysis import experiments, paths, reduction, runs
 from cleanrl_style import protocol
+from cleanrl_style.protocol.run_folder import folder_name
 
-MOST_EPISODES = 6000
-FLOAT_FORMAT = "%.6g"
-# The evaluation is written last: it declares the run finished.
-TABLES = ("episodes", "updates", "timing", "evaluation_years", "evaluation")
+POLICY = "policy.pt"
 
 
 @dataclass
 class Args:
     """Archives the finished runs."""
 
-    runs_dir: Path = runs.RUNS_DIR
+    runs_dir: Path = paths.runs()
     """folder that holds the runs, at any depth"""
-    archive_dir: Path = runs.ARCHIVE_DIR
+    archive_dir: Path = paths.archive()
     """folder of the archive"""
 
 
-def thin(name: str, table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of a run's table that are kept."""
-    if name == "episodes":
-        return table.iloc[:: -(-len(table) // MOST_EPISODES) or 1]
-    if name == "evaluation_years":
-        return table[(table.policy == "sampled") & table.preference.isin(runs.KEPT_WEIGHTS)]
-    return table
-
-
-def write_compressed(path: Path, table: pd.DataFrame) -> None:
-    """A table as gzip without time or name in its header, whole or not at all."""
-    text = table.to_csv(index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
-    with protocol.replacing(path) as file, gzip.GzipFile("", "wb", compresslevel=9, fileobj=file, mtime=0) as packed:
-        packed.write(text.encode())
+def write_tables(path: Path, run: runs.Run) -> None:
+    """A run's tables as a zip without times in it, whole or not at all."""
+    with protocol.replacing(path) as file, zipfile.ZipFile(file, "w") as packed:
+        for name, table in run.tables.items():
+            member = zipfile.ZipInfo(f"{name}.csv")  # of 1980, wherever and whenever it is written
+            member.create_system = 0
+            packed.writestr(member, reduction.as_text(name, table), zipfile.ZIP_DEFLATED, compresslevel=9)
 
 
 def folder_of(config: dict, archive_dir: Path) -> Path:
     """Where a run is archived: as `runs/` has it by default, wherever the run itself lies."""
-    arguments, changed = config["arguments"], config["not_default"]
-    name = "-".join(
-        [
-            arguments["env_id"].split(":")[-1].replace("/", "-"),
-            *(f"{name}={runs.as_text(value)}" for name, value in changed.items()),
-        ]
-    )
-    return archive_dir / config["script"] / name / f"seed{arguments['seed']}"
+    arguments = config["arguments"]
+    changed = {name: tuple(v) if isinstance(v, list) else v for name, v in config["not_default"].items()}
+    return archive_dir / config["script"] / folder_name(arguments["env_id"], changed) / f"seed{arguments['seed']}"
 
 
-def archive_run(run: runs.Run, archive_dir: Path) -> bool:
-    """Archive a run; False if the archive has it, made by the same commit."""
-    folder, config = folder_of(run.config, archive_dir), (run.folder / "config.json")
-    copy = folder / "config.json"
-    if copy.exists() and copy.read_bytes() == config.read_bytes() and runs.table_path(folder, "evaluation"):
+def archive_run(run: runs.Run, archive_dir: Path, jobs: list[experiments.Job]) -> bool:
+    """Archive a run, its policy if a job of the main experiment made it; False if the archive has it, of the same
+    commit.
+    """
+    folder, config = folder_of(run.config, archive_dir), (run.folder / "config.json").read_bytes()
+    policy = run.folder / POLICY
+    keeps_policy = policy.exists() and any(job.experiment == "main" and job.made(run.config) for job in jobs)
+    kept = {"config.json": config} | ({POLICY: policy.read_bytes()} if keeps_policy else {})
+    there = {name: (folder / name).read_bytes() for name in kept if (folder / name).exists()}
+    if there == kept and (folder / runs.ARCHIVED).exists():
         return False
-    tables = {name: runs.read_table(run.folder, name) for name in TABLES}
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    with protocol.replacing(copy) as file:
-        file.write(config.read_bytes())
-    for name, table in tables.items():
-        if table is not None:
-            write_compressed(folder / f"{name}.csv.gz", thin(name, table))
+    for name, content in kept.items():
+        with protocol.replacing(folder / name) as file:
+            file.write(content)
+    write_tables(folder / runs.ARCHIVED, run)  # last: it declares the run finished
     return True
 
 
@@ -84,7 +70,8 @@ def archive(runs_dir: Path, archive_dir: Path) -> None:
     found, left_out = runs.read_runs(runs_dir)
     for line in left_out:
         print(f"not archived: {line}", file=sys.stderr)
-    new = sum(archive_run(run, archive_dir) for run in found)
+    jobs = [*experiments.jobs(), *experiments.quick_jobs()]
+    new = sum(archive_run(run, archive_dir, jobs) for run in found)
     size = sum(path.stat().st_size for path in archive_dir.rglob("*") if path.is_file())
     print(f"{archive_dir}: {new} runs new of {len(found)}, {size / 1e6:.1f} MB in all")
 

@@ -29,6 +29,7 @@ import boreal_env
 import sim
 from analysis.machine import machine
 from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts
 from sim.block import HALF, LANES, compile_kernels
 from sim.draws import draw_year
 from sim.stands import available_cores
@@ -300,7 +301,7 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
             "update": update,
         }
         year = took["evaluation"] / played
-        evaluated = 100 * len(protocol.POLICIES) * len(protocol.EVAL_WEIGHTS) * boreal_env.DEFAULT_YEARS
+        evaluated = 100 * len(protocol.POLICIES) * len(fronts.evaluation_weights(2)) * boreal_env.DEFAULT_YEARS
         whole = (300_000 * sum(step.values()) + evaluated * year) / 60_000.0
         return {
             (f"{kind}, 300,000 steps with evaluation", "min"): whole,

@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis import experiments, runs
+from analysis import experiments, paths
 from analysis.paper_claims import (
     asymmetry,
     curriculum,
@@ -164,7 +164,7 @@ def contents(themes: dict[str, dict[int, str]], controls: int) -> str:
 def progress(results: Results) -> str:
     """How much of every experiment has been run, as a table, and its studies."""
     lines = ["| experiment | runs | planned | studies | what |", "|---|---|---|---|---|"]
-    for name, what in experiments.EXPERIMENTS.items():
+    for name, experiment in experiments.EXPERIMENTS.items():
         jobs = [job for job in results.jobs if job.experiment == name]
         planned = [job for job in jobs if not job.is_study]
         there = len(planned) - sum(job.experiment == name for job in results.missing)
@@ -173,7 +173,7 @@ def progress(results: Results) -> str:
             for job in jobs
             if job.is_study
         ]
-        lines.append(f"| `{name}` | {there} | {len(planned)} | {', '.join(studies)} | {what} |")
+        lines.append(f"| `{name}` | {there} | {len(planned)} | {', '.join(studies)} | {experiment.what} |")
     return "\n".join(lines)
 
 
@@ -197,10 +197,9 @@ def document(results: Results) -> tuple[str, Counter]:
 
 def main(args: Args) -> None:
     """Write the document; print how many claims have which verdict."""
-    archive = experiments.QUICK_ARCHIVE_DIR if args.quick else runs.ARCHIVE_DIR
-    results = Results.load(args.quick, args.runs_dir or (archive,))
+    results = Results.load(args.quick, args.runs_dir or (paths.archive(args.quick),))
     text, counts = document(results)
-    path = args.output or Path("results/quick/reproduction.md" if args.quick else "docs/reproduction.md")
+    path = args.output or (paths.results(quick=True) if args.quick else Path("docs")) / "reproduction.md"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with protocol.replacing(path) as file:

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import experiments, metrics, runs
-from analysis.results import METHODS, TITLES, Results
+from analysis import experiments, methods, metrics, paths
+from analysis.results import Results
 from analysis.tables import distance_to_best, main_results, single_sites
 from analysis.tables.common import GENERALIST, over_seeds
 from cleanrl_style import protocol
@@ -23,7 +23,7 @@ from cleanrl_style import protocol
 PAGES = (
     "README.md",
     "docs/learning.md",
-    *(f"docs/algorithms/{name}.md" for name in (*experiments.TRAINED, "heuristics")),
+    *(f"docs/algorithms/{name}.md" for name in (*methods.TRAINED, "heuristics")),
 )
 SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
 PLANS = {"dense_conifer": "100 conifers a year", "best_constant_mix": "best constant plan of each weight"}
@@ -40,7 +40,7 @@ COLUMNS = ("carbon_0", "carbon_1", "thaw_0", "thaw_1", "scalarized", "gain_scala
 class Args:
     """Writes the results of the archived runs into the documents."""
 
-    runs_dir: tuple[Path, ...] = (runs.ARCHIVE_DIR,)
+    runs_dir: tuple[Path, ...] = (paths.archive(),)
     """folders that hold the runs, at any depth: the archive, so that the documents show what a clone has"""
     root: Path = Path()
     """folder of README.md and docs/"""
@@ -86,21 +86,22 @@ def rows_of(results: Results, script: str, environment: str | None = None) -> li
     published = main_results.paper_rows().paper_scalarized
     found = [
         (key, [(one.evaluation, one.gains) for one in replicates])
-        for key, replicates in results.rows.items()
+        for key, replicates in results.rows_of_two_objectives().items()
         if key[0] == script and replicates and environment in (None, key[1])
     ]
     titled = []
     for (_, env_id, setting), evaluations in found:
         parts = [flags(setting), "" if env_id in (GENERALIST, environment) else f"`{env_id}`"]
         title = ", ".join(filter(None, parts)) or "default"
-        papers = published.get(METHODS[script], np.nan) if title == "default" else np.nan
-        titled.append((title, evaluations, papers, script in experiments.TRAINED))
+        papers = published.get(methods.paper_name(script), np.nan) if title == "default" else np.nan
+        titled.append((title, evaluations, papers, script in methods.TRAINED))
     return sorted(titled, key=lambda row: row[0] != "default")
 
 
 def named(script: str, rows: list) -> list:
     """The rows with the method's name before the flags."""
-    return [(TITLES[script] if title == "default" else f"{TITLES[script]}, {title}", *rest) for title, *rest in rows]
+    name = methods.title(script)
+    return [(name if title == "default" else f"{name}, {title}", *rest) for title, *rest in rows]
 
 
 def plans(results: Results) -> list[tuple[str, list]]:
@@ -127,8 +128,8 @@ def distances(results: Results) -> str:
         + "|\n"
     )
     for _, row in table[table.sites.str.endswith(distance_to_best.ALL)].iterrows():
-        trained = row.method in experiments.TRAINED
-        words = [TITLES.get(row.method, row.method), *((flags(row.setting), row.policy) if trained else ())]
+        trained = row.method in methods.TRAINED
+        words = [methods.title(row.method), *((flags(row.setting), row.policy) if trained else ())]
         cells = [", ".join(filter(None, words)), str(row.seeds) if trained else ""]
         for name in shares:
             low, high = row[f"{name}_low"], row[f"{name}_high"]
@@ -152,11 +153,11 @@ def section(results: Results, name: str) -> str:
         return TABLES[name](results)
     rows = []
     if name == "all":
-        for script in (*experiments.TRAINED, *experiments.HEURISTICS):
+        for script in (*methods.TRAINED, *methods.STRATEGIES):
             rows += named(script, rows_of(results, script, GENERALIST))
         rows = [row for row in rows if not any(flag in row[0] for flag in NOT_COMPARED)]
     elif name == "heuristics":
-        for script in experiments.HEURISTICS:
+        for script in methods.STRATEGIES:
             rows += named(script, rows_of(results, script))
     else:
         rows = rows_of(results, name)
@@ -179,6 +180,9 @@ def main(args: Args) -> None:
         print(f"left out: {problem}", file=sys.stderr)
     for page in PAGES:
         path = args.root / page
+        if not path.exists():
+            print(f"no page yet: {path}", file=sys.stderr)
+            continue
         text = path.read_text(encoding="utf-8")
         new, count = SECTION.subn(lambda match: match[1] + section(results, match[2]) + match[3], text)
         if not count:

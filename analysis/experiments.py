@@ -1,15 +1,16 @@
 """Every experiment of the paper, and the controls that its claims need, in the order that fills the tables first."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
-from analysis.runs import setting
-from cleanrl_style.protocol.evaluation import MODES
+from analysis import paths
+from analysis.methods import LEARNERS, METHODS, STRATEGIES
+from analysis.runs import SITE_SPECIFIC, setting
 
 ROOT = Path(__file__).parents[1]
-HEURISTICS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
-METHODS = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum")  # conditioned on the preference
-TRAINED = (*METHODS, "eupg_fixed_lambda")
+GENERALIST, ONE_SITE = "boreal-generalist-v0", "boreal-site-specific-v0"
 STUDIES = (
     "constant_plans",
     "training_gains",
@@ -25,23 +26,10 @@ SITE_SEEDS = (1, 2, 3, 4, 5)
 # Three of the twelve sites of results/fronts: a typical one, one where the carbon end of the front costs thaw, and one
 # of weak wind, where planting costs it and thinning does not.
 FRONT_SITES = (3_000_000_078, 3_000_000_210, 3_000_000_058)
-GENERALIST_STEPS, SITE_SPECIFIC_STEPS = 300_000, 100_000
+DEFAULT_STEPS = {"generalist": 300_000, SITE_SPECIFIC: 100_000}
 # analysis/studies/measure_balance.py: both returns vary equally between policies at a carbon scale of 1.4 kgC m-2 yr-1;
 # the paper's rewards are at 2.0, so the carbon reward times 2.0 / 1.4
 REWARD_SCALES = (1.43, 1.0)
-
-EXPERIMENTS = {
-    "main": "main table, strategies: heuristics, constant plans, and three methods with 10 seeds",
-    "fixed": "learning asymmetry: EUPG with a fixed weight, one run a weight and seed",
-    "site": "the same on single sites, one run a weight and site",
-    "thaw": "the thaw reward's formulations: gated PPO",
-    "balanced": "the three methods where both objectives weigh the same",
-    "controls": "what of the curriculum it is that helps",
-    "variants": "gated PPO with rescaled rewards, other advantages, fewer observations, another learning rate",
-    "mechanisms": "physical conflicts, counterfactual pairs, warming of selected sites",
-    "single": "gated PPO on one site alone, under all its weathers and first stands",
-    "difficulty": "why thaw is hard to learn: noise of actions and gradients; distance to the best known plans",
-}
 
 
 @dataclass(frozen=True)
@@ -55,8 +43,7 @@ class Job:
     @property
     def path(self) -> str:
         """The script's file, relative to the repository."""
-        folder = "analysis/studies" if self.is_study else "cleanrl_style" if self.trains else "baselines_heuristic"
-        return f"{folder}/{self.script}.py"
+        return f"analysis/studies/{self.script}.py" if self.is_study else METHODS[self.script].path
 
     @property
     def exists(self) -> bool:
@@ -76,7 +63,7 @@ class Job:
     @property
     def trains(self) -> bool:
         """Whether it trains an agent; else it evaluates a fixed strategy, or is a study."""
-        return self.script in TRAINED
+        return self.script in METHODS and METHODS[self.script].trains
 
     @property
     def arguments(self) -> list[str]:
@@ -94,21 +81,24 @@ class Job:
         return " ".join(["python", self.path, *self.arguments])
 
     @property
+    def mode(self) -> str:
+        """The environment's mode."""
+        return self.flags.get("mode", "generalist")
+
+    @property
     def env_id(self) -> str:
         """The environment that the flags mean."""
-        mode = self.flags.get("mode", "generalist")
-        return self.flags.get("env_id") or next(name for name, its_mode in MODES.items() if its_mode == mode)
+        return self.flags.get("env_id") or (ONE_SITE if self.mode == SITE_SPECIFIC else GENERALIST)
 
     @property
     def steps(self) -> int:
         """Environment steps of its training."""
-        default = SITE_SPECIFIC_STEPS if self.flags.get("mode") == "site-specific" else GENERALIST_STEPS
-        return self.flags.get("total_timesteps", default) if self.trains else 0
+        return self.flags.get("total_timesteps", DEFAULT_STEPS[self.mode]) if self.trains else 0
 
     @property
     def row(self) -> tuple[str, str, str]:
         """(script, environment, setting): the row of a table that its run belongs to."""
-        return self.script, self.env_id, setting(self.flags, self.env_id)
+        return self.script, self.env_id, setting(self.flags, self.mode)
 
     def made(self, config: dict) -> bool:
         """Whether a run with this config.json is this job's."""
@@ -140,8 +130,8 @@ def seeds_of(number: int, chosen: list[int] | None) -> list[int]:
 
 def main_table(seeds) -> list[Job]:
     """Heuristics and constant plans, then the three methods, a seed of all before the next."""
-    methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in METHODS]
-    fixed = [Job("main", script) for script in (*HEURISTICS, "constant_plans")]
+    methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in LEARNERS]
+    fixed = [Job("main", script) for script in (*STRATEGIES, "constant_plans")]
     return [*fixed, *methods, Job("main", "training_gains")]
 
 
@@ -162,7 +152,7 @@ def single_sites(seeds) -> list[Job]:
     sites.
     """
     numbers = seeds_of(len(SITE_SEEDS), seeds)
-    sites = {seed: {"mode": "site-specific", "site_seed": SITE_SEEDS[seed - 1]} for seed in numbers}
+    sites = {seed: {"mode": SITE_SPECIFIC, "site_seed": SITE_SEEDS[seed - 1]} for seed in numbers}
     jobs = []
     for seed, site in sites.items():
         jobs.append(Job("site", "zero_change", site))
@@ -188,8 +178,8 @@ def thaw_formulations(seeds) -> list[Job]:
 def balanced(seeds) -> list[Job]:
     """The three methods where both returns vary equally between policies."""
     env = {"env_id": "boreal-balanced-v0"}
-    return [Job("balanced", script, env) for script in HEURISTICS] + [
-        trained("balanced", script, seed, **env) for seed in seeds_of(5, seeds) for script in METHODS
+    return [Job("balanced", script, env) for script in STRATEGIES] + [
+        trained("balanced", script, seed, **env) for seed in seeds_of(5, seeds) for script in LEARNERS
     ]
 
 
@@ -199,9 +189,9 @@ def controls(seeds) -> list[Job]:
     The curriculum trains on about half of its episodes: with half the budget, ppo_gated has as many in gradients.
     """
     variants = (
-        ("ppo_gated", {"total_timesteps": GENERALIST_STEPS // 2}),
+        ("ppo_gated", {"total_timesteps": DEFAULT_STEPS["generalist"] // 2}),
         ("ppo_curriculum", {"raw_selector": True}),
-        ("ppo_gated", {"total_timesteps": 2 * GENERALIST_STEPS}),
+        ("ppo_gated", {"total_timesteps": 2 * DEFAULT_STEPS["generalist"]}),
         ("ppo_curriculum", {"selector": "coin"}),
     )
     return [trained("controls", script, seed, **flags) for script, flags in variants for seed in seeds_of(5, seeds)]
@@ -247,7 +237,7 @@ def front_sites(seeds) -> list[Job]:
                 "single",
                 "ppo_gated",
                 seed,
-                total_timesteps=SITE_SPECIFIC_STEPS,
+                total_timesteps=DEFAULT_STEPS[SITE_SPECIFIC],
                 ent_coef=0.0,
                 per_objective_advantages=True,
                 **site,
@@ -261,33 +251,46 @@ def difficulty(seeds) -> list[Job]:
     return [Job("difficulty", script) for script in ("signal_to_noise", "gradient_noise", "distance_to_best")]
 
 
-JOBS_OF = {
-    "main": main_table,
-    "fixed": fixed_weights,
-    "site": single_sites,
-    "thaw": thaw_formulations,
-    "balanced": balanced,
-    "controls": controls,
-    "variants": variants,
-    "mechanisms": mechanisms,
-    "single": front_sites,
-    "difficulty": difficulty,
+class Experiment(NamedTuple):
+    """Jobs, made of the chosen training seeds (None: all), and what they are for."""
+
+    jobs: Callable[[list[int] | None], list[Job]]
+    what: str
+
+
+EXPERIMENTS = {
+    "main": Experiment(
+        main_table, "main table, strategies: heuristics, constant plans, and three methods with 10 seeds"
+    ),
+    "fixed": Experiment(fixed_weights, "learning asymmetry: EUPG with a fixed weight, one run a weight and seed"),
+    "site": Experiment(single_sites, "the same on single sites, one run a weight and site"),
+    "thaw": Experiment(thaw_formulations, "the thaw reward's formulations: gated PPO"),
+    "balanced": Experiment(balanced, "the three methods where both objectives weigh the same"),
+    "controls": Experiment(controls, "what of the curriculum it is that helps"),
+    "variants": Experiment(
+        variants,
+        "gated PPO with rescaled rewards, other advantages, fewer observations, another learning rate",
+    ),
+    "mechanisms": Experiment(mechanisms, "physical conflicts, counterfactual pairs, warming of selected sites"),
+    "single": Experiment(front_sites, "gated PPO on one site alone, under all its weathers and first stands"),
+    "difficulty": Experiment(
+        difficulty, "why thaw is hard to learn: noise of actions and gradients; distance to the best known plans"
+    ),
 }
 
 
 def jobs(only=tuple(EXPERIMENTS), seeds: list[int] | None = None) -> list[Job]:
     """All jobs of the chosen experiments and seeds, in order."""
-    return [job for name in EXPERIMENTS if name in only for job in JOBS_OF[name](seeds)]
+    return [job for name in EXPERIMENTS if name in only for job in EXPERIMENTS[name].jobs(seeds)]
 
 
 # ------------------------------------------------------------------------------------------------- in small
 
-QUICK_DIR, QUICK_ARCHIVE_DIR = Path("runs/quick"), Path("results/quick/runs")
 QUICK_STEPS = 1600  # an episode of each of 32 stands
 QUICK_EVALUATION = {"eval_episodes": 2, "eval_weights": (0.0, 0.5, 1.0)}
 
 
-def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path = QUICK_DIR) -> list[Job]:
+def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path | None = None) -> list[Job]:
     """Every script of every experiment, in seconds: one seed, the first of its settings, the outer weights."""
     small, seen = [], set()
     for number, job in enumerate(jobs(only, [1])):
@@ -300,11 +303,10 @@ def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path = QUICK_DIR) -> list[Job]
             small.append(Job(job.experiment, job.script, {"quick": True}))
             continue
         if job.steps:
-            default = SITE_SPECIFIC_STEPS if flags.get("mode") == "site-specific" else GENERALIST_STEPS
-            flags["total_timesteps"] = QUICK_STEPS * job.steps // default
+            flags["total_timesteps"] = QUICK_STEPS * job.steps // DEFAULT_STEPS[job.mode]
         flags |= QUICK_EVALUATION
         if "preference" in flags:
             del flags["eval_weights"]  # an agent of one weight is evaluated at it
-        flags["run_dir"] = runs_dir / f"{number:02d}-{job.script}"
+        flags["run_dir"] = (runs_dir or paths.runs(quick=True)) / f"{number:02d}-{job.script}"
         small.append(Job(job.experiment, job.script, flags))
     return small

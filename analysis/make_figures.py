@@ -13,6 +13,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
+from analysis import paths
 from analysis.figures import (
     algorithm_comparison,
     demographics,
@@ -78,7 +79,7 @@ def main(args: Args) -> None:
         )
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)
-    folder = args.figures_dir or Path("results/quick/figures" if args.quick else "results/figures")
+    folder = args.figures_dir or paths.results(args.quick) / "figures"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for module in FIGURES:

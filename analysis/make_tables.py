@@ -11,6 +11,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis import paths
 from analysis.results import Results
 from analysis.tables import (
     curriculum_selection,
@@ -21,6 +22,7 @@ from analysis.tables import (
     learned_strategies,
     learning_difficulty,
     main_results,
+    many_objectives,
     physical_conflicts,
     runtime,
     single_sites,
@@ -91,7 +93,7 @@ def main(args: Args) -> None:
             f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, these the rows:\n"
             + "\n".join(f"  {command}" for command in commands)
         )
-    folder = args.tables_dir or Path("results/quick/tables" if args.quick else "results/tables")
+    folder = args.tables_dir or paths.results(args.quick) / "tables"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for module in TABLES:
@@ -101,12 +103,15 @@ def main(args: Args) -> None:
             if module is main_results:
                 print("Sampled policies; interquartile mean over training seeds [95 % bootstrap interval].\n")
                 print(text[list(main_results.TERMINAL)].to_string(index=False))
+        others = many_objectives.make(results)
+        for name, (table, columns) in others.items():
+            write_table(folder / name, table, readable(table, columns))
     except OSError as error:
         sys.exit(f"error: --tables-dir {folder}: cannot write there ({error.strerror})")
     say_what_is_missing(results)
     if any(one.gains is None for replicates in rows.values() for one in replicates):
         print("Gains need a run of baselines_heuristic/zero_change.py in the same environment, as long.")
-    print(f"\n{len(TABLES)} tables with all columns: {folder}/*.csv, *.md, *.tex")
+    print(f"\n{len(TABLES) + len(others)} tables with all columns: {folder}/*.csv, *.md, *.tex")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""Metrics of multi-objective policies, and statistics over training seeds.
+"""Metrics of multi-objective policies, for any number of objectives m, and statistics over training seeds.
 
 An *evaluation* is the DataFrame of a run's `evaluation.csv`, restricted to one policy (greedy or sampled):
-one row per episode, with the columns `preference` (the carbon weight w_C), `seed` (of the episode: the same
-seed is the same site and weather under every weight and method), `carbon_return` and `thaw_return`. Both
-objectives are maximised; a set of points is an array (n, 2) of [carbon, thaw].
+one row per episode, with the columns of the weights (see `fronts.weight_columns`; of two objectives `preference`, the
+first's), `seed` (of the episode: the same seed is the same site and weather under every weight and method), and
+`<objective>_return` of each objective. All are maximised; a set of points is an array (n, m).
 """
 
 import numpy as np
@@ -11,22 +11,42 @@ import pandas as pd
 from scipy import stats
 
 from cleanrl_style.protocol.fronts import (  # noqa: F401
-    OBJECTIVES,
     REFERENCE_POINT,
     cardinality,
     expected_utility,
     hypervolume,
-    mean_returns,
     nondominated,
+    objectives_of,
+    return_columns,
+    returns_of,
     scalarize,
     sparsity,
+    weight_columns,
+    weights_of,
 )
+
+
+def pair(preference) -> np.ndarray:
+    """Weights (..., 2) of two objectives, by the first's (...)."""
+    preference = np.asarray(preference)
+    return np.stack([preference, 1 - preference], axis=-1)
+
+
+def mean_returns(evaluation: pd.DataFrame) -> pd.DataFrame:
+    """Mean returns over the episodes of each weight, a column an objective; index: the weights, ascending."""
+    objectives = objectives_of(evaluation.columns)
+    return by_weight(evaluation)[return_columns(objectives)].mean().sort_index()
+
+
+def by_weight(evaluation: pd.DataFrame):
+    """The evaluation grouped by weight: by one column of two objectives, else by one an objective."""
+    weights = weight_columns(objectives_of(evaluation.columns))
+    return evaluation.groupby(weights[0] if len(weights) == 1 else weights)
 
 
 def mean_scalarized(evaluation: pd.DataFrame) -> float:
     """Scalarised return, averaged over weights and episodes."""
-    returns = scalarize(evaluation.carbon_return, evaluation.thaw_return, evaluation.preference)
-    return float(returns.mean())
+    return float(scalarize(returns_of(evaluation), weights_of(evaluation)).mean())
 
 
 # ----------------------------------------------------------------------------- paired over the same episodes
@@ -37,7 +57,8 @@ def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame) -> pd.DataFrame:
 
     Raises ValueError if zero change was not evaluated on every one of the evaluation's seeds.
     """
-    reference = zero_change.drop_duplicates("seed").set_index("seed")[OBJECTIVES]
+    columns = return_columns(objectives_of(evaluation.columns))
+    reference = zero_change.drop_duplicates("seed").set_index("seed")[columns]
     missing = sorted(set(evaluation.seed) - set(reference.index))
     if missing:
         raise ValueError(
@@ -45,8 +66,8 @@ def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame) -> pd.DataFrame:
             f"(nor on {len(missing) - 1} others); evaluate both with the same --eval-episodes"
         )
     difference = evaluation.copy()
-    difference[OBJECTIVES] -= reference.loc[evaluation.seed].to_numpy()
-    difference["scalarized_return"] = scalarize(*difference[OBJECTIVES].to_numpy().T, difference.preference)
+    difference[columns] -= reference.loc[evaluation.seed].to_numpy()
+    difference["scalarized_return"] = scalarize(returns_of(difference), weights_of(difference))
     return difference
 
 
@@ -59,15 +80,27 @@ def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values.mean(axis=0), stats.t.ppf(0.975, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
 
 
+def with_interval(name: str, values: np.ndarray) -> dict[str, float]:
+    """A mean under its name, and the ends of its 95 % t interval under <name>_low and <name>_high."""
+    mean, half_width = mean_interval(values)
+    return {name: mean, f"{name}_low": mean - half_width, f"{name}_high": mean + half_width}
+
+
 def paired_returns(evaluation: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Weights (k,) ascending, and both returns of every episode under every weight, (episodes, k, 2).
+    """Weights (k, m) in ascending order, and the returns of every episode under every weight, (episodes, k, m).
 
     Raises ValueError if the weights were not evaluated on the same episodes.
     """
-    tables = [evaluation.pivot(index="seed", columns="preference", values=name) for name in OBJECTIVES]
+    objectives = objectives_of(evaluation.columns)
+    weights = weight_columns(objectives)
+    tables = [evaluation.pivot(index="seed", columns=weights, values=name) for name in return_columns(objectives)]
     if any(table.isna().to_numpy().any() for table in tables):
         raise ValueError("the weights were not evaluated on the same episodes: they cannot be paired")
-    return tables[0].columns.to_numpy(), np.stack([table.to_numpy() for table in tables], axis=2)
+    levels = tables[0].columns.to_frame().to_numpy(dtype=float)
+    return pair(levels[:, 0]) if len(weights) == 1 else levels, np.stack([table.to_numpy() for table in tables], axis=2)
+
+
+# Of two objectives alone: weights on a line have neighbours, those of more do not.
 
 
 def _violates(changes: np.ndarray, margin: np.ndarray | float = 0.0) -> np.ndarray:
@@ -111,21 +144,23 @@ def expected_violations_percent(returns: np.ndarray, repetitions: int = 2000) ->
 
 
 def preference_response(evaluation: pd.DataFrame) -> pd.DataFrame:
-    """How both returns follow the preference, over the paired episodes, with 95 % intervals.
+    """How the returns follow the preference, over the paired episodes, with 95 % intervals.
 
-    Rows carbon_return and thaw_return. Columns: `change` from the lowest to the highest weight, `slope` of
-    the return against the weight (least squares within each episode), each with `_low` and `_high`.
+    A row a return. Columns: `change` from the lowest to the highest weight, `slope` of the return against the weight
+    (least squares within each episode), each with `_low` and `_high`. The weight is the objective's own; of two
+    objectives the first's for both, so that a policy that follows has a change above and one below 0.
     """
     weights, returns = paired_returns(evaluation)
     if len(weights) < 2:
         raise ValueError(f"a response to the preference needs two weights or more, not {len(weights)}")
-    centred = weights - weights.mean()
-    slopes = np.tensordot(returns, centred, axes=(1, 0)) / (centred**2).sum()
-    table = pd.DataFrame(index=OBJECTIVES)
-    for name, values in (("change", returns[:, -1] - returns[:, 0]), ("slope", slopes)):
-        mean, half_width = mean_interval(values)
-        table[name], table[f"{name}_low"], table[f"{name}_high"] = mean, mean - half_width, mean + half_width
-    return table
+    rows = {}
+    for k, name in enumerate(return_columns(objectives_of(evaluation.columns))):
+        weight = weights[:, 0 if weights.shape[1] == 2 else k]
+        ends = [returns[:, weight == end, k].mean(axis=1) for end in (weight.min(), weight.max())]
+        centred = weight - weight.mean()
+        slopes = returns[:, :, k] @ centred / (centred**2).sum()
+        rows[name] = with_interval("change", ends[1] - ends[0]) | with_interval("slope", slopes)
+    return pd.DataFrame.from_dict(rows, orient="index")
 
 
 # ------------------------------------------------------------------------------------ over training seeds

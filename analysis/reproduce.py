@@ -21,13 +21,11 @@ from pathlib import Path
 from typing import Literal
 
 import boreal_env
-from analysis import archive, claims, document_results, experiments, make_figures, make_tables, runs
+from analysis import archive, claims, document_results, experiments, make_figures, make_tables, paths, runs
 from cleanrl_style import protocol
 from sim.stands import available_cores
 
-Experiment = Literal[
-    "main", "fixed", "site", "thaw", "balanced", "controls", "variants", "mechanisms", "single", "difficulty"
-]
+Experiment = Literal[tuple(experiments.EXPERIMENTS)]
 POLL_SECONDS, REPORT_SECONDS = 0.5, 30.0
 STOP_SECONDS = 30.0  # that a job has to end by itself
 LAST_LINES = 8  # of a failed job's output
@@ -155,7 +153,7 @@ def finished_configs(*roots: Path) -> list[dict]:
     configs = []
     for folder in (folder for root in roots for folder in runs.run_folders(root)):
         try:
-            configs.append(runs.read_config(folder) if runs.table_path(folder, "evaluation") else None)
+            configs.append(runs.read_config(folder) if runs.is_finished(folder) else None)
         except ValueError as error:
             print(f"{folder}: {error}", file=sys.stderr)
     return [config for config in configs if config]
@@ -171,8 +169,7 @@ def main(args: Args) -> None:
     for script in dict.fromkeys(job.script for job in jobs if not job.exists):
         print(f"no script yet: {script}.py; its jobs are left out", file=sys.stderr)
     jobs = [job for job in jobs if job.exists]
-    runs_dir = experiments.QUICK_DIR if args.quick else runs.RUNS_DIR
-    archive_dir = experiments.QUICK_ARCHIVE_DIR if args.quick else runs.ARCHIVE_DIR
+    runs_dir, archive_dir = paths.runs(args.quick), paths.archive(args.quick)
     roots = (runs_dir, archive_dir) if args.skip_archived else (runs_dir,)
     configs = finished_configs(*roots)
 

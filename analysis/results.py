@@ -4,37 +4,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from analysis import experiments, metrics, runs
+from analysis import experiments, methods, metrics, paths, reduction, runs
 from analysis.studies import stored
 
-STUDIES_DIR = Path("results/studies")
-QUICK_STUDIES_DIR = Path("results/quick/studies")
-
-#: Our scripts, and what the paper's tables call them (None: it has no such row).
-METHODS = {
-    "ppo_curriculum": "curriculum_ppo",
-    "ppo_gated": "ppo_gated",
-    "eupg_var_lambda": "eupg_variable_lambda",
-    "eupg_fixed_lambda": "fixed_weight_eupg",
-    "target_density": "target_density",
-    "conifer_restoration": "conifer_restoration",
-    "zero_change": "zero_density_change",
-    "plus_100": "plus_100_density",
-    "random_valid": None,
-}
-TITLES = {
-    "ppo_curriculum": "Curriculum PPO",
-    "ppo_gated": "PPO Gated",
-    "eupg_var_lambda": "Variable λ EUPG",
-    "eupg_fixed_lambda": "Fixed λ EUPG",
-    "target_density": "Target density 1000",
-    "conifer_restoration": "Conifer restoration",
-    "zero_change": "Zero change",
-    "plus_100": "+100 a year",
-    "random_valid": "Random",
-}
+PAIR = ["carbon", "thaw"]  # the paper's objectives
 
 
 @dataclass(frozen=True)
@@ -49,10 +25,40 @@ class Replicate:
         """Its runs, each a replicate of its own."""
         return [Replicate([run], run.evaluation, None) for run in self.runs]
 
-    def years(self, variables: list[str] | None = None) -> pd.DataFrame:
-        """Annual record of the sampled policy: means over the episodes, of the weights that are kept."""
-        table = pd.concat([run.years for run in self.runs if run.years is not None], ignore_index=True)
-        return table if variables is None else table[table.variable.isin(variables)]
+    @property
+    def years(self) -> pd.DataFrame:
+        """Annual record, a row a kept weight and year: means over the episodes of the columns of `reduction.ANNUAL`."""
+        return self._joined("years", reduction.ANNUAL)
+
+    @property
+    def last_year(self) -> pd.DataFrame:
+        """Percentiles over the episodes in the last year, a row a kept weight and variable of `reduction.SPREAD`."""
+        return self._joined("last_year", ("p10", "p50", "p90"))
+
+    def _joined(self, name: str, columns) -> pd.DataFrame:
+        """A table of all its runs; without rows if none has it, which keeps no annual record."""
+        tables = [run.tables[name] for run in self.runs if len(run.tables.get(name, ()))]
+        return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["year", *columns], dtype=float)
+
+    def mean_of_years(self, variables) -> dict[str, float]:
+        """Means over the years and the kept weights of columns of the annual record."""
+        unknown = [name for name in variables if name not in reduction.ANNUAL]
+        if unknown:
+            raise ValueError(
+                f"{unknown[0]}: no column of the annual record that is kept (analysis/reduction.py, ANNUAL)"
+            )
+        return self.years.reindex(columns=list(variables)).mean().to_dict()
+
+
+def by_year(replicates: list[Replicate], variable: str) -> np.ndarray:
+    """A column of the annual record, averaged over the kept weights, (replicates, years)."""
+    return np.array([one.years.groupby("year")[variable].mean().to_numpy() for one in replicates])
+
+
+def weights_of(arguments: dict) -> tuple | None:
+    """The one preference that an agent is trained for; None of an agent of all."""
+    preference = arguments.get("preference")
+    return None if preference is None else tuple(np.ravel(preference).tolist())
 
 
 class Results:
@@ -72,10 +78,8 @@ class Results:
 
         The archive comes before the runs themselves, so that a clone's tables have the same digits.
         """
-        if quick:
-            default = experiments.QUICK_ARCHIVE_DIR, experiments.QUICK_DIR
-            return Results(roots or default, experiments.quick_jobs(), QUICK_STUDIES_DIR)
-        return Results(roots or (runs.ARCHIVE_DIR, runs.RUNS_DIR), experiments.jobs(), STUDIES_DIR)
+        jobs = experiments.quick_jobs() if quick else experiments.jobs()
+        return Results(roots or (paths.archive(quick), paths.runs(quick)), jobs, paths.studies(quick))
 
     @cached_property
     def rows(self) -> dict[tuple, list[Replicate]]:
@@ -91,14 +95,14 @@ class Results:
 
     def _complete(self, key, replicate, its_runs) -> bool:
         """Whether one agent a weight is there for every weight of the experiment; if not, it is named."""
-        wanted = {job.flags["preference"] for job in self.jobs if job.row == key and "preference" in job.flags}
-        lacking = wanted - {run.arguments.get("preference") for run in its_runs}
+        wanted = {weights_of(job.flags) for job in self.jobs if job.row == key and "preference" in job.flags}
+        lacking = wanted - {weights_of(run.arguments) for run in its_runs}
         if lacking:
             seed, site_seed = replicate
             site = "" if site_seed is None else f", site seed {site_seed}"
             self.left_out.append(
                 f"{key[0]}, {key[1]}, seed {seed}{site}: partial, without the agents of the weights "
-                f"{', '.join(f'{weight:g}' for weight in sorted(lacking))}"
+                f"{', '.join(map(runs.as_text, sorted(lacking)))}"
             )
         return not lacking
 
@@ -118,6 +122,15 @@ class Results:
         longest = max(same, key=len, default=None)
         known = longest is not None and set(evaluation.seed) <= set(longest.seed)
         return metrics.gains(evaluation, longest) if known else None
+
+    def objectives(self, env_id: str) -> list[str]:
+        """An environment's objectives, by its runs; the paper's two without a run."""
+        run = next((run for run in self.runs if run.arguments["env_id"] == env_id), None)
+        return PAIR if run is None else metrics.objectives_of(run.evaluation.columns)
+
+    def rows_of_two_objectives(self) -> dict[tuple, list[Replicate]]:
+        """The rows of environments that pay carbon and thaw, which the paper's tables are about."""
+        return {key: replicates for key, replicates in self.rows.items() if self.objectives(key[1]) == PAIR}
 
     def of(self, experiment: str, script: str, **flags) -> list[Replicate]:
         """Replicates of an experiment's row: the first of its jobs with these flags says which; none without a job."""
@@ -140,6 +153,10 @@ class Results:
     def is_papers(self, key: tuple) -> bool:
         """Whether a row is one of the paper's: no control, and not of the balanced environment."""
         return key[2] == "default" or any(job.row == key for job in self.jobs if job.experiment in ("main", "fixed"))
+
+    def paper_name(self, key: tuple) -> str | None:
+        """What the paper's tables call the method of a row; None if the row is not one of theirs."""
+        return methods.paper_name(key[0]) if self.is_papers(key) and key[1] == experiments.GENERALIST else None
 
     def is_trained(self, key: tuple) -> bool:
         """Whether a row is of a script that trains, by its jobs or its runs."""

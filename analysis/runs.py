@@ -1,9 +1,10 @@
-"""Finished runs on disk: those of `runs/`, and the archive in `results/runs/`, whose tables are compressed.
+"""Finished runs on disk: those of `runs/`, and the archive in `results/runs/`, which has the reduced tables alone.
 
 A run is recognised by its config.json, never by the name of its folder, and is finished when its evaluation is there.
 """
 
 import json
+import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,14 +12,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import metrics
-from cleanrl_style.protocol.evaluation import EVALUATION_COLUMNS, MODES
+from analysis import paths, reduction
+from cleanrl_style.protocol import fronts
 
-RUNS_DIR, ARCHIVE_DIR = Path("runs"), Path("results/runs")
-QUICK = "quick"  # folder of runs/ with the runs of `reproduce.py --quick`, which are no results
-
-# Weights whose annual record tables and figures read; the archive has no other.
-KEPT_WEIGHTS = (0.0, 0.5, 1.0)
+SITE_SPECIFIC = "site-specific"  # the mode in which all episodes are of one site and weather
+ARCHIVED = "tables.zip"  # the reduced tables of an archived run
 
 # Arguments that do not make another row: what tells its runs apart, what the row has a column for, and the output.
 NOT_A_SETTING = ("seed", "site_seed", "preference", "mode", "env_id", "run_dir", "overwrite")
@@ -26,14 +24,11 @@ NOT_A_SETTING = ("seed", "site_seed", "preference", "mode", "env_id", "run_dir",
 
 @dataclass(frozen=True)
 class Run:
-    """A finished run: its configuration, the evaluation of its sampled policy, and its other tables."""
+    """A finished run: its configuration, and what `analysis.reduction` keeps of its tables, by name."""
 
     folder: Path
     config: dict
-    evaluation: pd.DataFrame
-    episodes: pd.DataFrame | None  # of the training; None for a fixed strategy
-    timing: pd.DataFrame  # seconds by phase
-    years: pd.DataFrame | None  # annual record of the sampled policy at KEPT_WEIGHTS: statistics over the episodes
+    tables: dict[str, pd.DataFrame]
 
     @property
     def script(self) -> str:
@@ -46,22 +41,38 @@ class Run:
         return self.config["arguments"]
 
     @property
+    def evaluation(self) -> pd.DataFrame:
+        """The episodes of the primary policy."""
+        table = self.tables["evaluation"]
+        return table[table.policy == reduction.PRIMARY]
+
+    def course(self, column: str, statistic: str = "mean", parts: int = reduction.BINS) -> np.ndarray:
+        """Mean or standard deviation ("std") of a column in equal parts of the training, see `reduction.course`."""
+        return reduction.course(self.tables["learning"], column, statistic, parts)
+
+    @property
     def setting(self) -> str:
         """What is not default in the run, but for what tells replicates apart: runs that agree in it are one row."""
-        return setting(self.config["not_default"], self.arguments["env_id"])
+        return setting(self.config["not_default"], self.arguments["mode"])
+
+    @property
+    def share_selected(self) -> float:
+        """Share of a curriculum's episodes that it was trained on."""
+        (row,) = self.tables["selection"].itertuples()
+        return row.selected / row.episodes
 
 
-def setting(not_default: dict, env_id: str) -> str:
+def setting(not_default: dict, mode: str) -> str:
     """name=value of the arguments that make a row, "default" if there are none; which single site, makes none."""
     items = {name: value for name, value in not_default.items() if name not in NOT_A_SETTING}
-    if not_default.get("site_seed") is not None and MODES.get(env_id) != "site-specific":
+    if not_default.get("site_seed") is not None and mode != SITE_SPECIFIC:
         items["site_seed"] = "one"
     return ", ".join(f"{name}={as_text(value)}" for name, value in sorted(items.items())) or "default"
 
 
 def as_text(value) -> str:
     """An argument as rows and folders name it."""
-    return ",".join(f"{v:g}" for v in value) if isinstance(value, (list, tuple)) else str(value)
+    return ",".join(f"{v:g}" for v in np.ravel(value)) if isinstance(value, (list, tuple)) else str(value)
 
 
 def identity(config: dict) -> str:
@@ -69,21 +80,34 @@ def identity(config: dict) -> str:
     return json.dumps([config["script"], config["arguments"]], sort_keys=True)
 
 
-def table_path(folder: Path, name: str) -> Path | None:
-    """A run's table, plain or compressed; None if it has none of that name."""
-    candidates = (folder / f"{name}.csv", folder / f"{name}.csv.gz")
-    return next((path for path in candidates if path.exists()), None)
+def is_finished(folder: Path) -> bool:
+    """Whether a folder's run is finished: it has its evaluation, or is archived."""
+    return (folder / ARCHIVED).exists() or (folder / "evaluation.csv").exists()
 
 
-def read_table(folder: Path, name: str) -> pd.DataFrame | None:
-    """A run's table, None if it has none; ValueError if it cannot be read."""
-    path = table_path(folder, name)
-    if path is None:
-        return None
+def read_archived(folder: Path) -> dict[str, pd.DataFrame]:
+    """The tables of an archived run; ValueError if they cannot be read."""
     try:
-        return pd.read_csv(path)
-    except (ValueError, OSError, EOFError, zlib.error) as error:
-        raise ValueError(f"damaged: {path.name} ({error})") from error
+        with zipfile.ZipFile(folder / ARCHIVED) as file:
+            return {name.removesuffix(".csv"): reduction.parse(file.read(name).decode()) for name in file.namelist()}
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(f"damaged: {ARCHIVED} ({error})") from error
+
+
+def read_whole(folder: Path, trained: bool) -> dict[str, pd.DataFrame]:
+    """The tables of a run of runs/; ValueError says which is missing or cannot be read."""
+    tables = {}
+    for name in ("evaluation", "timing", "evaluation_years", *(["episodes"] if trained else [])):
+        path = folder / f"{name}.csv"
+        if not path.exists() and name == "evaluation_years":
+            continue  # its environment keeps no annual record
+        if not path.exists():
+            raise ValueError(f"{'unfinished' if name == 'evaluation' else 'partial'}: it has no {name}.csv")
+        try:
+            tables[name] = pd.read_csv(path)
+        except (ValueError, OSError) as error:
+            raise ValueError(f"damaged: {path.name} ({error})") from error
+    return tables
 
 
 def read_config(folder: Path) -> dict:
@@ -91,7 +115,7 @@ def read_config(folder: Path) -> dict:
     try:
         config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
         config["script"], config["not_default"]
-        for name in ("env_id", "seed", "eval_weights", "eval_episodes", "thaw_formulation", "site_seed"):
+        for name in ("env_id", "mode", "seed", "eval_weights", "eval_episodes", "thaw_formulation", "site_seed"):
             config["arguments"][name]
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"damaged: config.json ({error!r})") from error
@@ -101,43 +125,40 @@ def read_config(folder: Path) -> dict:
 def read_run(folder: Path) -> Run:
     """A run; ValueError says why it cannot be used."""
     config = read_config(folder)
-    evaluation = read_table(folder, "evaluation")
-    if evaluation is None:
-        raise ValueError("unfinished: it has no evaluation.csv")
-    missing = set(EVALUATION_COLUMNS) - set(evaluation.columns)
+    if (folder / ARCHIVED).exists():
+        run = Run(folder, config, read_archived(folder))
+        check(run.evaluation, config["arguments"])
+        return run
+    steps = config["arguments"].get("total_timesteps")
+    tables = read_whole(folder, steps is not None)
+    check(tables["evaluation"], config["arguments"])
+    try:
+        return Run(folder, config, reduction.reduce(tables, steps))
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"damaged: a table lacks a column ({error})") from error
+
+
+def check(evaluation: pd.DataFrame, arguments: dict) -> None:
+    """ValueError if an evaluation is not whole."""
+    objectives = fronts.objectives_of(evaluation.columns)
+    needed = ["policy", "seed", "site_seed", "scalarized_return", *fronts.weight_columns(objectives)]
+    missing = [name for name in needed if name not in evaluation]
     if missing:
-        raise ValueError(f"damaged: evaluation.csv lacks the column {sorted(missing)[0]}")
-    evaluation = evaluation[evaluation.policy == "sampled"]
-    arguments = config["arguments"]
-    # a fixed-weight agent is evaluated at its own weight alone
-    weights = [arguments["preference"]] if "preference" in arguments else arguments["eval_weights"]
-    expected = len(weights) * arguments["eval_episodes"]
+        raise ValueError(f"damaged: evaluation.csv with the returns of {objectives} lacks the column {missing[0]}")
+    evaluation = evaluation[evaluation.policy == reduction.PRIMARY]
+    expected = len(arguments["eval_weights"]) * arguments["eval_episodes"]
     if len(evaluation) != expected:
         raise ValueError(
-            f"damaged: evaluation.csv has {len(evaluation)} episodes of the sampled policy, not {expected}"
+            f"damaged: evaluation.csv has {len(evaluation)} episodes of the {reduction.PRIMARY} policy, not {expected}"
         )
-    if not np.isfinite(evaluation[metrics.OBJECTIVES].to_numpy(dtype=float)).all():
+    if not np.isfinite(evaluation[fronts.return_columns(objectives)].to_numpy(dtype=float)).all():
         raise ValueError("damaged: evaluation.csv has returns that are not finite numbers")
-    episodes = required_table(folder, "episodes") if "total_timesteps" in arguments else None
-    timing = required_table(folder, "timing")
-    years = required_table(folder, "evaluation_years") if arguments["env_id"] in MODES else None
-    if years is not None:
-        years = years[(years.policy == "sampled") & years.preference.isin(KEPT_WEIGHTS)]
-    return Run(folder, config, evaluation, episodes, timing, years)
-
-
-def required_table(folder: Path, name: str) -> pd.DataFrame:
-    """A table that a finished run has; ValueError if it is missing or cannot be read."""
-    table = read_table(folder, name)
-    if table is None:
-        raise ValueError(f"partial: it has no {name}.csv")
-    return table
 
 
 def run_folders(root: Path) -> list[Path]:
     """Folders below `root` that hold a config.json, in order; those of `reproduce.py --quick` only if asked for."""
     folders = sorted(path.parent for path in root.rglob("config.json"))
-    return [folder for folder in folders if folder.relative_to(root).parts[:1] != (QUICK,)]
+    return [folder for folder in folders if folder.relative_to(root).parts[:1] != (paths.QUICK,)]
 
 
 def read_runs(*roots: Path) -> tuple[list[Run], list[str]]:

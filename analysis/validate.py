@@ -90,9 +90,8 @@ def write(folder: Path, text: str, figures: dict[str, bytes]) -> None:
     for path, content in [(images / name, png) for name, png in figures.items()] + [
         (folder / "validation.md", text.encode())
     ]:
-        part = path.with_name(path.name + ".part")
-        part.write_bytes(content)
-        os.replace(part, path)
+        with protocol.replacing(path) as file:
+            file.write(content)
 
 
 def main(args: Args) -> None:

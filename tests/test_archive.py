@@ -1,7 +1,6 @@
-import gzip
 import shutil
+import zipfile
 
-import numpy as np
 import pandas as pd
 import pytest
 from tiny_runs import TINY_RUNS, write_run
@@ -33,14 +32,14 @@ def test_folders_are_named_as_the_runs_are(archived):
     assert archive.folder_of(config, archived) == archived / "a" / "toy-one-v0-eval_weights=0,0.5-site_seed=7" / "seed3"
 
 
-def test_round_trip(archived):
+def test_a_run_and_its_archive_are_the_same(archived):
     (first, *_), left_out = runs.read_runs(TINY_RUNS)
     (copy, *_), left_out_copies = runs.read_runs(archived)
     assert left_out == left_out_copies == []
     assert copy.config == first.config
-    for name in ("evaluation", "episodes", "timing"):
-        pd.testing.assert_frame_equal(getattr(copy, name), getattr(first, name))
-    pd.testing.assert_frame_equal(copy.years, first.years.reset_index(drop=True), check_dtype=False)
+    assert list(copy.tables) == list(first.tables)
+    for name, table in first.tables.items():
+        pd.testing.assert_frame_equal(copy.tables[name], table)
 
 
 def test_tables_from_the_archive_are_the_same_bytes(archived, tmp_path):
@@ -53,9 +52,8 @@ def test_the_same_bytes_from_another_place(archived, tmp_path):
     shutil.copytree(TINY_RUNS, tmp_path / "elsewhere")
     archive.archive(tmp_path / "elsewhere", tmp_path / "second")
     assert files_of(archived) == files_of(tmp_path / "second")
-    header = gzip.open(next(archived.rglob("*.gz")), "rb")
-    header.read()
-    assert header.mtime == 0
+    with zipfile.ZipFile(next(archived.rglob("tables.zip"))) as packed:
+        assert {member.date_time[0] for member in packed.infolist()} == {1980}
 
 
 def test_only_what_is_new_is_written(archived, capsys):
@@ -67,23 +65,31 @@ def test_only_what_is_new_is_written(archived, capsys):
 
 def test_an_archive_that_was_stopped_is_completed(archived):
     whole = files_of(archived)
-    for path in archived.rglob("evaluation.csv.gz"):
+    for path in archived.rglob("tables.zip"):
         path.unlink()
     archive.archive(TINY_RUNS, archived)
     assert files_of(archived) == whole
 
 
-def test_many_episodes_are_thinned_evenly():
-    table = pd.DataFrame({"episode": np.arange(1, 12_002)})
-    kept = archive.thin("episodes", table).episode
-    assert len(kept) == 4001 and set(np.diff(kept)) == {3}
-    assert len(archive.thin("episodes", table[:6000])) == 6000
-    assert archive.thin("episodes", table[:0]).empty
+def test_agents_of_the_main_experiment_are_kept(tmp_path):
+    flags = {"vectorization": "lockstep"}
+    write_run(tmp_path / "runs" / "main", "ppo_gated", **flags)
+    write_run(tmp_path / "runs" / "variant", "ppo_gated", **flags, ent_coef=0.0)
+    write_run(tmp_path / "runs" / "balanced", "ppo_gated", env_id="boreal-balanced-v0", **flags)
+    for name in ("main", "variant", "balanced"):
+        (tmp_path / "runs" / name / "policy.pt").write_bytes(b"weights")
+    archive.archive(tmp_path / "runs", tmp_path / "archive")
+    (kept,) = (tmp_path / "archive").rglob("policy.pt")
+    assert kept.parent.parent.name == "boreal-generalist-v0-vectorization=lockstep" and kept.read_bytes() == b"weights"
+    # trained again, by the same commit to the same configuration
+    (tmp_path / "runs" / "main" / "policy.pt").write_bytes(b"others")
+    archive.archive(tmp_path / "runs", tmp_path / "archive")
+    assert kept.read_bytes() == b"others"
 
 
-def test_annual_records_of_other_weights_are_left_out():
-    years = pd.DataFrame({"policy": ["greedy", "sampled", "sampled"], "preference": [0.5, 0.5, 0.4]})
-    assert archive.thin("evaluation_years", years).index.tolist() == [1]
+def test_a_damaged_archive_is_named(archived):
+    next(archived.rglob("tables.zip")).write_bytes(b"no zip")
+    assert "damaged: tables.zip" in runs.read_runs(archived)[1][0]
 
 
 def test_unfinished_runs_are_named(tmp_path, capsys):
@@ -91,7 +97,7 @@ def test_unfinished_runs_are_named(tmp_path, capsys):
     (tmp_path / "runs" / "one" / "evaluation.csv").unlink()
     archive.archive(tmp_path / "runs", tmp_path / "archive")
     assert "one: unfinished" in capsys.readouterr().err
-    assert not list((tmp_path / "archive").rglob("*.gz"))
+    assert not list((tmp_path / "archive").rglob("*.*"))
 
 
 def test_runs_of_quick_are_no_results(tmp_path):

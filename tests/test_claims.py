@@ -132,8 +132,8 @@ def test_the_papers_tables(tmp_path):
     assert verdicts[paper_itself.scalarised] == verdicts[paper_itself.violations] == REPRODUCED
     assert found(paper_itself.hypervolumes, tmp_path)[1]["hypervolume, Curriculum PPO"] == "120 from its details"
     heuristics = found(paper_itself.heuristic_hypervolumes, tmp_path)[1]
-    assert heuristics["hypervolume, zero change (scalarised −2.5)"] == "at most 0 as one point"
-    assert heuristics["hypervolume, target density (scalarised 4.3)"] == "at most 39.7 as one point"  # 6.3 squared
+    assert heuristics["hypervolume, Zero change (scalarised −2.5)"] == "at most 0 as one point"
+    assert heuristics["hypervolume, Target density 1000 (scalarised 4.3)"] == "at most 39.7 as one point"  # 6.3 squared
     # weights 0 and 1 have the spread of thaw and of carbon alone; the means are 7.8 .. 10
     assert "at most 1.65" in found(paper_itself.spreads, tmp_path)[1]["standard deviation, Curriculum PPO"]
 

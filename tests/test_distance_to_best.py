@@ -190,7 +190,7 @@ def calls(monkeypatch):
     monkeypatch.setattr(distance_to_best, "judge", judge)
     monkeypatch.setattr(distance_to_best, "agent_policy", lambda folder, config: (folder.name, {}))
     monkeypatch.setattr(distance_to_best, "strategy", lambda name: name)
-    monkeypatch.setattr(experiments, "HEURISTICS", ("zero_change",))
+    monkeypatch.setattr("analysis.methods.STRATEGIES", ("zero_change",))
     return methods
 
 

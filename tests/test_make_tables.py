@@ -249,8 +249,7 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
         file = runs / name / "evaluation.csv"
         change(pd.read_csv(file)).to_csv(file, index=False)
     (runs / "partial" / "episodes.csv").unlink()
-    (runs / "broken-years" / "evaluation_years.csv").unlink()
-    (runs / "broken-years" / "evaluation_years.csv.gz").write_bytes(b"no gzip")
+    (runs / "broken-years" / "evaluation_years.csv").write_bytes(b"")
     table = make(runs, tmp_path / "tables")
     assert table.loc[("ppo_curriculum", "boreal-generalist-v0", "default")].seeds == 2
     lines = capsys.readouterr().err.splitlines()
@@ -259,10 +258,10 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
         ("unfinished", "no evaluation.csv"),
         ("config", "config.json"),
         ("truncated", "5 episodes"),
-        ("columns", "lacks the column thaw_return"),
+        ("columns", "the returns of ['carbon'] lacks the column weight_carbon"),
         ("infinite", "not finite"),
         ("partial", "partial: it has no episodes.csv"),
-        ("broken-years", "evaluation_years.csv.gz"),
+        ("broken-years", "damaged: evaluation_years.csv"),
         ("zz-first", "the same run as"),
     ]:
         assert sum(str(runs / name) + ":" in line and reason in line for line in lines) == 1, name

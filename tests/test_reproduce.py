@@ -9,17 +9,17 @@ from scripts import run_script
 from tiny_runs import TINY_RUNS
 
 import boreal_env
-from analysis import experiments, reproduce, runs
+from analysis import experiments, methods, reproduce, runs
 from analysis.experiments import Job
 from cleanrl_style import protocol
 from cleanrl_style.ppo_gated import Args
 
 COUNTS = {
-    "main": 37,
+    "main": 7 + 10 * len(methods.LEARNERS),
     "fixed": 25,
     "site": 45,
     "thaw": 12,
-    "balanced": 20,
+    "balanced": 5 + 5 * len(methods.LEARNERS),
     "controls": 20,
     "variants": 40,
     "mechanisms": 2,
@@ -34,13 +34,9 @@ def test_experiments():
     assert [job.experiment for job in jobs] == sorted((job.experiment for job in jobs), key=list(COUNTS).index)
     assert len({job.command for job in jobs}) == len(jobs)
     # heuristics first, then a seed of every method before the next
-    assert [(job.script, job.flags["seed"]) for job in jobs[6:10]] == [
-        ("eupg_var_lambda", 1),
-        ("ppo_gated", 1),
-        ("ppo_curriculum", 1),
-        ("eupg_var_lambda", 2),
-    ]
-    assert sum(job.steps for job in jobs if job.experiment == "main") == 30 * 300_000
+    trained = [(job.script, job.flags["seed"]) for job in jobs if job.experiment == "main" and job.trains]
+    assert trained == [(script, seed) for seed in range(1, 11) for script in methods.LEARNERS]
+    assert sum(job.steps for job in jobs if job.experiment == "main") == len(trained) * 300_000
     assert len(experiments.jobs(["fixed", "site"], [2])) == 5 + 9
 
 

@@ -5,7 +5,7 @@ import pytest
 from tiny_runs import TINY_RUNS
 
 import boreal_env
-from analysis import runs
+from analysis import experiments, runs
 from analysis.studies import training_gains
 from cleanrl_style import protocol
 
@@ -27,7 +27,7 @@ def test_the_episodes_are_those_of_the_training():
 def test_gains_are_differences_on_the_same_episode():
     run = runs.read_run(TINY_RUNS / "curriculum")
     stream = {name: run.arguments[name] for name in training_gains.STREAM}
-    episodes = run.episodes.iloc[[1, 3]]
+    episodes = run.tables["sample"].iloc[[1, 3]]
     nothing = pd.DataFrame(
         {
             **stream,
@@ -47,14 +47,14 @@ def test_gains_are_differences_on_the_same_episode():
 
 
 def test_without_runs_it_names_a_command(tmp_path, monkeypatch):
-    found = training_gains.results.Results((tmp_path,), training_gains.experiments.jobs(), tmp_path)
+    found = training_gains.results.Results((tmp_path,), experiments.jobs(), tmp_path)
     monkeypatch.setattr(training_gains.results.Results, "load", staticmethod(lambda quick: found))
     with pytest.raises(SystemExit, match="no finished run; python cleanrl_style/eupg_var_lambda.py"):
         training_gains.main(training_gains.Args())
 
 
 def test_a_stream_that_is_there_is_not_played_again(tmp_path, monkeypatch):
-    found = training_gains.results.Results((TINY_RUNS,), training_gains.experiments.jobs(), tmp_path)
+    found = training_gains.results.Results((TINY_RUNS,), experiments.jobs(), tmp_path)
     monkeypatch.setattr(training_gains.results.Results, "load", staticmethod(lambda quick: found))
     played = []
 

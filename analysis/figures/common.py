@@ -1,4 +1,4 @@
-"""What all figures share: colours, letters, curves with bands, panels without data, files with the same bytes."""
+"""What all figures share: letters, curves with bands, panels without data, files with the same bytes."""
 
 import textwrap
 from pathlib import Path
@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from analysis import metrics
-from analysis.experiments import METHODS
-from analysis.results import TITLES
+from analysis.methods import LEARNERS, METHODS
+from analysis.results import by_year
 from cleanrl_style import protocol
 
 STYLE = {
@@ -28,31 +28,7 @@ STYLE = {
     "svg.hashsalt": "borearl",
     "pdf.fonttype": 42,
 }
-# Okabe and Ito (2008): told apart with every kind of colour vision; the markers tell them apart in grey.
-COLOURS = {
-    "eupg_var_lambda": "#CC79A7",
-    "ppo_gated": "#009E73",
-    "ppo_curriculum": "#D55E00",
-    "eupg_fixed_lambda": "#0072B2",
-    "zero_change": "#000000",
-    "plus_100": "#56B4E9",
-    "target_density": "#E69F00",
-    "conifer_restoration": "#0072B2",
-    "random_valid": "#999999",
-}
-MARKERS = {
-    "eupg_var_lambda": "s",
-    "ppo_gated": "^",
-    "ppo_curriculum": "o",
-    "eupg_fixed_lambda": "D",
-    "zero_change": "x",
-    "plus_100": "+",
-    "target_density": "v",
-    "conifer_restoration": "*",
-    "random_valid": "1",
-}
 WEIGHT_COLOURS = "viridis"
-BINS = 40  # of a learning curve
 SEEDS_95 = "curves and bands: interquartile mean over training seeds and its 95 % interval (none with one seed)"
 
 
@@ -65,10 +41,12 @@ def save(figure: Figure, stem: Path) -> None:
 
 
 def panels(figure: Figure, rows: int, columns: int, titles: list[str]) -> list:
-    """Axes with letters and titles, row by row."""
+    """Axes with letters and titles, row by row, one a title."""
     axes = list(figure.subplots(rows, columns, squeeze=False).flat)
-    letter(axes, titles)
-    return axes
+    for ax in axes[len(titles) :]:
+        ax.remove()
+    letter(axes[: len(titles)], titles)
+    return axes[: len(titles)]
 
 
 def letter(axes, titles) -> None:
@@ -145,35 +123,23 @@ def band(ax, x, curves, colour, label, style="-", marker=None) -> None:
         ax.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0)
 
 
-def binned(episodes: pd.DataFrame, column: str, steps: int, statistic: str = "mean", bins: int = BINS) -> np.ndarray:
-    """A statistic of the training episodes that ended in each of equal parts of the training, (bins,)."""
-    number = np.minimum((episodes.global_step - 1) * bins // steps, bins - 1)
-    return episodes[column].groupby(number).agg(statistic).reindex(range(bins)).to_numpy()
-
-
-def training_curve(ax, tables, column: str, steps: int, colour, label, statistic="mean", bins=BINS, **kwargs) -> None:
-    """A column of training episodes against environment steps; one table a replicate."""
-    curves = np.array([binned(table, column, steps, statistic, bins) for table in tables])
+def training_curve(ax, curves, steps: int, colour, label, **kwargs) -> None:
+    """Curves (replicates, parts of the training) against steps, but for parts in which one has no episodes."""
+    curves = np.asarray(curves)
     known = ~np.isnan(curves).any(axis=0)
-    x = (np.arange(bins) + 0.5) * steps / bins / 1000
+    x = (np.arange(curves.shape[1]) + 0.5) * steps / curves.shape[1] / 1000
     band(ax, x[known], curves[:, known], colour, label, **kwargs)
 
 
-def learning_curve(ax, replicates, column: str, colour, label: str, **kwargs) -> None:
+def steps_of(runs) -> int:
+    """Environment steps of the longest training."""
+    return max(run.arguments["total_timesteps"] for run in runs)
+
+
+def learning_curve(ax, replicates, column: str, colour, label: str, statistic: str = "mean") -> None:
     """A column of the training episodes of replicates of one run each."""
     runs = [one.runs[0] for one in replicates]
-    steps = max(run.arguments["total_timesteps"] for run in runs)
-    training_curve(ax, [run.episodes for run in runs], column, steps, colour, label, **kwargs)
-
-
-def by_year(replicates, variable: str) -> np.ndarray:
-    """A column of the annual record, averaged over the kept weights, (replicates, years)."""
-
-    def of_one(one):
-        years = one.years([variable])
-        return years.groupby("year")["mean"].mean().to_numpy()
-
-    return np.array([of_one(one) for one in replicates])
+    training_curve(ax, [run.course(column, statistic) for run in runs], steps_of(runs), colour, label)
 
 
 def year_curve(ax, replicates, variable: str, colour, label: str, style="-") -> None:
@@ -195,19 +161,19 @@ def by_season(replicates, bins: int = 8) -> tuple[np.ndarray, np.ndarray]:
 
 def season_curves(ax, results) -> None:
     """Growing season against thaw return for every method."""
-    for script, title in methods(ax, results):
-        band(ax, *by_season(results.of("main", script)), COLOURS[script], title, marker=MARKERS[script])
+    for method in learners(ax, results):
+        band(ax, *by_season(results.of("main", method.script)), method.colour, method.title, marker=method.marker)
     finish(ax, xlabel="days above 5 °C", ylabel="thaw return (50 years)")
 
 
 # ---------------------------------------------------------------------------------------------- trade-offs
 
 
-def methods(ax, results):
-    """(script, title) of the preference-conditioned methods that have runs; the others' commands are noted."""
-    for script in METHODS:
+def learners(ax, results):
+    """The preference-conditioned methods that have runs; the others' commands are noted."""
+    for script in LEARNERS:
         if not wanting(ax, results, "main", script):
-            yield script, TITLES[script]
+            yield METHODS[script]
 
 
 def mean_front(replicates) -> pd.DataFrame:

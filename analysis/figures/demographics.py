@@ -1,8 +1,10 @@
 """Stems by age class through the 50 years, and the conifer fractions of training and evaluation."""
 
 import numpy as np
+import pandas as pd
 
-from analysis.figures.common import COLOURS, SEEDS_95, finish, legend, letter, methods, year_curve
+from analysis.figures.common import SEEDS_95, finish, learners, legend, letter, year_curve
+from analysis.reduction import BINS
 
 SIZE = (7, 7)
 CAPTION = (
@@ -28,25 +30,29 @@ def draw(figure, results) -> None:
     axes += list(lower.subplots(1, 2).flat)
     letter(axes, [*CLASSES.values(), "conifer fraction, training", "conifer fraction, evaluation"])
     for ax, age in zip(axes[:5], CLASSES, strict=True):
-        for script, title in methods(ax, results):
+        for method in learners(ax, results):
             for species, style in (("conifer", "-"), ("deciduous", "--")):
-                label = title if species == "conifer" else None
-                year_curve(ax, results.of("main", script), f"{species}_{age}_stems_ha", COLOURS[script], label, style)
+                label = method.title if species == "conifer" else None
+                year_curve(
+                    ax, results.of("main", method.script), f"{species}_{age}_stems_ha", method.colour, label, style
+                )
         finish(ax, xlabel="year", ylabel="stems/ha", ylim=(0, None))
 
     training, evaluation = axes[5:]
-    for script, _ in methods(training, results):
-        episodes = [one.runs[0].episodes for one in results.of("main", script)]
-        last = [table.final_conifer_fraction[table.global_step > 0.8 * table.global_step.max()] for table in episodes]
-        training.hist(np.concatenate(last), np.linspace(0, 1, 41), density=True, histtype="step", color=COLOURS[script])
+    for method in learners(training, results):
+        stands = pd.concat([one.runs[0].tables["composition"] for one in results.of("main", method.script)])
+        edges = np.linspace(0, 1, BINS + 1)
+        middles = stands.conifer_fraction + edges[1] / 2
+        number = {"weights": stands.episodes, "density": True}
+        training.hist(middles, edges, **number, histtype="step", color=method.colour)
     finish(training, xlabel="conifer fraction after 50 years", ylabel="density of episodes")
     height = 0
-    for script, _ in methods(evaluation, results):
-        for one in results.of("main", script):
-            years = one.years(["conifer_fraction"])
-            for row in years[years.year == years.year.max()].sort_values("preference").itertuples():
-                evaluation.plot([row.p10, row.p90], [height, height], color=COLOURS[script], linewidth=1)
-                evaluation.plot(row.p50, height, "|", color=COLOURS[script], markersize=4)
+    for method in learners(evaluation, results):
+        for one in results.of("main", method.script):
+            last = one.last_year[one.last_year.variable == "conifer_fraction"]
+            for row in last.sort_values("preference").itertuples():
+                evaluation.plot([row.p10, row.p90], [height, height], color=method.colour, linewidth=1)
+                evaluation.plot(row.p50, height, "|", color=method.colour, markersize=4)
                 height -= 1
         height -= 2
     finish(evaluation, xlabel="conifer fraction after 50 years", xlim=(0, 1))

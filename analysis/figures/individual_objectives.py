@@ -4,15 +4,13 @@ import numpy as np
 
 from analysis import metrics
 from analysis.figures.common import (
-    COLOURS,
-    MARKERS,
     SEEDS_95,
     STEPS,
     band,
     finish,
+    learners,
     learning_curve,
     legend,
-    methods,
     panels,
 )
 
@@ -25,12 +23,12 @@ def draw(figure, results) -> None:
     """Learning curves of both, then both by weight."""
     axes = panels(figure, 2, 2, ["carbon, training", "thaw, training", "carbon, evaluation", "thaw, evaluation"])
     for ax, (column, label) in zip(axes[:2], OBJECTIVES.items(), strict=True):
-        for script, title in methods(ax, results):
-            learning_curve(ax, results.of("main", script), column, COLOURS[script], title)
+        for method in learners(ax, results):
+            learning_curve(ax, results.of("main", method.script), column, method.colour, method.title)
         finish(ax, ylabel=label, **STEPS)
     for ax, (column, label) in zip(axes[2:], OBJECTIVES.items(), strict=True):
-        for script, title in methods(ax, results):
-            fronts = [metrics.mean_returns(one.evaluation)[column] for one in results.of("main", script)]
-            band(ax, fronts[0].index, np.array(fronts), COLOURS[script], title, marker=MARKERS[script])
+        for method in learners(ax, results):
+            fronts = [metrics.mean_returns(one.evaluation)[column] for one in results.of("main", method.script)]
+            band(ax, fronts[0].index, np.array(fronts), method.colour, method.title, marker=method.marker)
         finish(ax, xlabel="weight of carbon", ylabel=label)
     legend(figure, axes)

@@ -11,6 +11,7 @@ from analysis.figures.common import (
     legend,
     letter,
     no_data,
+    steps_of,
     training_curve,
     wanting,
 )
@@ -70,10 +71,7 @@ def site_gains(ax, results, colours) -> None:
             of_weight = [run for run in runs if run.arguments["preference"] == weight]
             if not of_weight:
                 continue
-            steps = max(run.arguments["total_timesteps"] for run in of_weight)
-            tables = [
-                run.episodes.assign(gain=run.episodes[objective] - zero[run.arguments["site_seed"]][objective].mean())
-                for run in of_weight
-            ]
-            training_curve(ax, tables, "gain", steps, colours(0.9 * weight), None, style=style)
+            nothing = [zero[run.arguments["site_seed"]][objective].mean() for run in of_weight]
+            gains = [run.course(objective) - mean for run, mean in zip(of_weight, nothing, strict=True)]
+            training_curve(ax, gains, steps_of(of_weight), colours(0.9 * weight), None, style=style)
     finish(ax, ylabel="gain in the own objective", **STEPS)

@@ -1,20 +1,21 @@
 """Whether the methods learn: returns and gains in training, against fixed strategies and the best constant plan."""
 
+import numpy as np
+
 from analysis import metrics
-from analysis.experiments import HEURISTICS, METHODS
 from analysis.figures.common import (
-    COLOURS,
     SEEDS_95,
     STEPS,
     finish,
+    learners,
     learning_curve,
     legend,
-    methods,
     no_data,
     panels,
+    steps_of,
     training_curve,
 )
-from analysis.results import TITLES
+from analysis.methods import LEARNERS, METHODS, STRATEGIES
 from analysis.studies import constant_plans
 from analysis.studies.training_gains import gains
 
@@ -36,10 +37,11 @@ def draw(figure, results) -> None:
     nothing = results.study("training_gains")
     levels = [] if nothing is None else baselines(results, nothing)
     for k, name in enumerate(QUANTITIES):
-        for script, title in methods(axes[k], results):
-            learning_curve(axes[k], results.of("main", script), f"{name}_return", COLOURS[script], title)
-        for script, _ in methods(axes[3 + k], results) if nothing is not None else ():
-            gain_curve(axes[3 + k], results.of("main", script), nothing, f"{name}_gain", COLOURS[script])
+        for method in learners(axes[k], results):
+            replicates = results.of("main", method.script)
+            learning_curve(axes[k], replicates, f"{name}_return", method.colour, method.title)
+        for method in learners(axes[3 + k], results) if nothing is not None else ():
+            gain_curve(axes[3 + k], results.of("main", method.script), nothing, f"{name}_gain", method.colour)
         for ax, kind in ((axes[k], "return"), (axes[3 + k], "gain")):
             if kind == "gain" and nothing is None:
                 no_data(ax, "python analysis/studies/training_gains.py")
@@ -53,11 +55,13 @@ def draw(figure, results) -> None:
 
 def gain_curve(ax, replicates, nothing, column: str, colour) -> None:
     """A gain of the training episodes against environment steps; none until every seed has it: a part may mislead."""
-    found = [(one.runs[0], gains(one.runs[0], nothing)) for one in replicates]
-    if any(table is None for _, table in found):
+    runs = [one.runs[0] for one in replicates]
+    tables, steps = [gains(run, nothing) for run in runs], steps_of(runs)
+    if any(table is None for table in tables):
         return
-    steps = max(run.arguments["total_timesteps"] for run, _ in found)
-    training_curve(ax, [table for _, table in found], column, steps, colour, None, bins=PARTS)
+    parts = [np.minimum((table.global_step - 1) * PARTS // steps, PARTS - 1) for table in tables]
+    curves = [table[column].groupby(part).mean() for table, part in zip(tables, parts, strict=True)]
+    training_curve(ax, [curve.reindex(range(PARTS)) for curve in curves], steps, colour, None)
 
 
 def baselines(results, nothing) -> list[tuple]:
@@ -66,15 +70,14 @@ def baselines(results, nothing) -> list[tuple]:
     nothing : the study's table. The evaluation's sites are few, and returns differ between sites far more than between
     strategies, so that a strategy's level among the training's returns is its gain over zero change's mean there.
     """
-    evaluated = [
-        (TITLES[script], COLOURS[script], one.evaluation) for script in HEURISTICS for one in results.of("main", script)
-    ]
-    zero = next((evaluation for title, _, evaluation in evaluated if title == TITLES["zero_change"]), None)
+    fixed = [(METHODS[script], one.evaluation) for script in STRATEGIES for one in results.of("main", script)]
+    zero = next((evaluation for method, evaluation in fixed if method.script == "zero_change"), None)
     if zero is None:
         return []
+    evaluated = [(method.title, method.colour, evaluation) for method, evaluation in fixed]
     plans = results.study("constant_plans")
     if plans is not None:
-        env_id = results.first_job("main", METHODS[0]).env_id
+        env_id = results.first_job("main", LEARNERS[0]).env_id
         weights = sorted(zero.preference.unique())
         best = constant_plans.as_evaluation(plans[plans.env_id == env_id], weights, best=True)
         evaluated.append((BEST, "#000000", best))

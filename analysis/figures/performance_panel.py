@@ -3,19 +3,18 @@
 import numpy as np
 
 from analysis.figures.common import (
-    COLOURS,
-    MARKERS,
     RETURNS,
     SEEDS_95,
-    binned,
-    by_year,
     finish,
+    learners,
     legend,
     mean_front,
-    methods,
     panels,
     season_curves,
 )
+from analysis.methods import LEARNERS
+from analysis.reduction import AGE_CLASSES, SPECIES
+from analysis.results import by_year
 
 SIZE = (7, 5.4)
 CAPTION = (
@@ -23,7 +22,7 @@ CAPTION = (
     f"(c) {SEEDS_95}. (d) mean over the weights 0, 0.5 and 1 and seeds; bars: sd over seeds."
 )
 PARTS = 8  # of the training
-CLASSES = ("seedling", "sapling", "young", "mature", "old")
+GROUP, BARS = 0.81, 0.75  # width of a class's bars, with the gaps between them and without
 
 
 def draw(figure, results) -> None:
@@ -31,40 +30,37 @@ def draw(figure, results) -> None:
     training, evaluation, season, ages = panels(
         figure, 2, 2, ["training", "evaluation", "growing season and thaw", "ages after 50 years"]
     )
-    for script, title in methods(training, results):
-        runs = [one.runs[0] for one in results.of("main", script)]
-        steps = max(run.arguments["total_timesteps"] for run in runs)
-        thaw, carbon = (
-            np.mean([binned(run.episodes, name, steps, bins=PARTS) for run in runs], axis=0)
-            for name in ("thaw_return", "carbon_return")
-        )
+    for method in learners(training, results):
+        runs = [one.runs[0] for one in results.of("main", method.script)]
+        courses = [[run.course(f"{name}_return", parts=PARTS) for run in runs] for name in ("thaw", "carbon")]
+        thaw, carbon = (np.mean(one, axis=0) for one in courses)
         known = np.flatnonzero(~np.isnan(thaw))
-        training.plot(thaw[known], carbon[known], color=COLOURS[script], linewidth=0.7, alpha=0.6)
-        training.plot(thaw[known[-1]], carbon[known[-1]], MARKERS[script], color=COLOURS[script], label=title)
+        training.plot(thaw[known], carbon[known], color=method.colour, linewidth=0.7, alpha=0.6)
+        training.plot(thaw[known[-1]], carbon[known[-1]], method.marker, color=method.colour, label=method.title)
     finish(training, **RETURNS)
-    for script, title in methods(evaluation, results):
-        front = mean_front(results.of("main", script))
-        evaluation.plot(front.thaw_return, front.carbon_return, MARKERS[script], color=COLOURS[script], label=title)
+    for method in learners(evaluation, results):
+        front = mean_front(results.of("main", method.script))
+        evaluation.plot(front.thaw_return, front.carbon_return, method.marker, color=method.colour, label=method.title)
     finish(evaluation, **RETURNS)
     season_curves(season, results)
-    for k, (script, _) in enumerate(methods(ages, results)):
+    for k, method in enumerate(learners(ages, results)):
         stems = np.array(
             [
                 sum(
-                    by_year(results.of("main", script), f"{species}_{age}_stems_ha")[:, -1]
-                    for species in ("conifer", "deciduous")
+                    by_year(results.of("main", method.script), f"{species}_{age}_stems_ha")[:, -1]
+                    for species in SPECIES
                 )
-                for age in CLASSES
+                for age in AGE_CLASSES
             ]
         )
         ages.bar(
-            np.arange(len(CLASSES)) + 0.27 * (k - 1),
+            np.arange(len(AGE_CLASSES)) + GROUP / len(LEARNERS) * (k - (len(LEARNERS) - 1) / 2),
             stems.mean(axis=1),
-            0.25,
+            BARS / len(LEARNERS),
             yerr=stems.std(axis=1),
-            color=COLOURS[script],
+            color=method.colour,
             error_kw={"linewidth": 0.6},
         )
-    ages.set_xticks(range(len(CLASSES)), CLASSES)
+    ages.set_xticks(range(len(AGE_CLASSES)), AGE_CLASSES)
     finish(ages, ylabel="stems/ha")
     legend(figure, [training, season])

@@ -1,12 +1,10 @@
 """What each method does with the stands of the evaluation."""
 
 from analysis.figures.common import (
-    COLOURS,
-    MARKERS,
     SEEDS_95,
     finish,
+    learners,
     legend,
-    methods,
     panels,
     season_curves,
     year_curve,
@@ -29,23 +27,18 @@ def draw(figure, results) -> None:
         (species, "conifer_fraction", "conifer fraction"),
         (density, "density_stems_ha", "stems/ha"),
     ):
-        for script, title in methods(ax, results):
-            year_curve(ax, results.of("main", script), variable, COLOURS[script], title)
+        for method in learners(ax, results):
+            year_curve(ax, results.of("main", method.script), variable, method.colour, method.title)
         finish(ax, xlabel="year", ylabel=label)
-    for script, _ in methods(composition, results):
-        for one in results.of("main", script):
-            years = one.years(["density_stems_ha", "conifer_fraction"])
-            last = years[years.year == years.year.max()].pivot(
-                index="preference", columns="variable", values=["p10", "p50", "p90"]
-            )
+    for method in learners(composition, results):
+        for one in results.of("main", method.script):
+            last = one.last_year.pivot(index="preference", columns="variable", values=["p10", "p50", "p90"])
             x, y = last["p50"].density_stems_ha, last["p50"].conifer_fraction
             spread = {
                 name: [last["p50"][column] - last["p10"][column], last["p90"][column] - last["p50"][column]]
                 for name, column in (("xerr", "density_stems_ha"), ("yerr", "conifer_fraction"))
             }
-            composition.errorbar(
-                x, y, **spread, fmt=MARKERS[script], color=COLOURS[script], linewidth=0.5, markersize=4
-            )
+            composition.errorbar(x, y, **spread, fmt=method.marker, color=method.colour, linewidth=0.5, markersize=4)
     finish(composition, xlabel="stems/ha", ylabel="conifer fraction", ylim=(0, 1))
     season_curves(season, results)
     legend(figure, [species, season])

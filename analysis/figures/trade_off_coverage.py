@@ -1,19 +1,19 @@
 """The trade-offs that each method covers, a point a weight."""
 
 from analysis.figures.common import RETURNS, finish, panels, wanting, weight_points
-from analysis.results import TITLES
+from analysis.methods import FIXED_WEIGHT, LEARNERS, METHODS, scripts
 
 SIZE = (7, 5.4)
 CAPTION = (
     "Evaluation, means over 100 episodes, sums over 50 years. Large: mean over seeds; small: seeds; line: the "
     "points that none dominates."
 )
-PANELS = {"eupg_fixed_lambda": "fixed", "eupg_var_lambda": "main", "ppo_gated": "main", "ppo_curriculum": "main"}
+PANELS = dict.fromkeys(scripts(FIXED_WEIGHT), "fixed") | dict.fromkeys(LEARNERS, "main")  # script -> experiment
 
 
 def draw(figure, results) -> None:
     """A panel a method."""
-    axes = panels(figure, 2, 2, [TITLES[script] for script in PANELS])
+    axes = panels(figure, -(-len(PANELS) // 2), 2, [METHODS[script].title for script in PANELS])
     points = None
     for ax, (script, experiment) in zip(axes, PANELS.items(), strict=True):
         if not wanting(ax, results, experiment, script):

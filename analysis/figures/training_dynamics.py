@@ -1,6 +1,6 @@
 """What the methods do with stands while they train."""
 
-from analysis.figures.common import COLOURS, SEEDS_95, STEPS, finish, learning_curve, legend, methods, panels
+from analysis.figures.common import SEEDS_95, STEPS, finish, learners, learning_curve, legend, panels
 
 SIZE = (7, 2.9)
 CAPTION = f"Training episodes; {SEEDS_95}."
@@ -13,7 +13,7 @@ def draw(figure, results) -> None:
         (species, "mean_conifer_fraction", "conifer fraction, mean of 50 years"),
         (density, "mean_density", "stems/ha, mean of 50 years"),
     ):
-        for script, title in methods(ax, results):
-            learning_curve(ax, results.of("main", script), column, COLOURS[script], title)
+        for method in learners(ax, results):
+            learning_curve(ax, results.of("main", method.script), column, method.colour, method.title)
         finish(ax, ylabel=label, **STEPS)
     legend(figure, [species])

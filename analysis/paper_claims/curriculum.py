@@ -1,6 +1,5 @@
 """Section 4.3 and the appendix on the curriculum: is it the selection that helps, and what is selected."""
 
-import numpy as np
 import pandas as pd
 
 from analysis.paper_claims.claim import (
@@ -102,7 +101,7 @@ def raw_network(evidence):
 
 def share_selected(one) -> dict:
     """Share of a run's training episodes that were trained on."""
-    return {"share": one.runs[0].episodes.selected.mean()}
+    return {"share": one.runs[0].share_selected}
 
 
 @claim(
@@ -196,16 +195,12 @@ def threshold_breathes(evidence):
 
 def breathing(one) -> dict:
     """How the threshold of a run moved, and with it the share of its episodes that score above it."""
-    episodes = one.runs[0].episodes
-    moves = np.diff(episodes.threshold)
-    moves = moves[moves != 0]
-    lowest, highest = episodes.threshold.min(), episodes.threshold.max()
-    between = (episodes.score > lowest) & (episodes.score <= highest)
+    (row,) = one.runs[0].tables["selection"].itertuples()
     return {
-        "lowest": lowest,
-        "highest": highest,
-        "range": 100 * between.mean(),
-        "up": 100 * (moves > 0).mean() if len(moves) else 0.0,
+        "lowest": row.lowest_threshold,
+        "highest": row.highest_threshold,
+        "range": 100 * row.between / row.episodes,
+        "up": 100 * row.moves_up / row.moves if row.moves else 0.0,
     }
 
 

@@ -7,7 +7,6 @@ import pandas as pd
 
 from analysis import metrics
 from analysis.experiments import Job
-from analysis.figures.common import binned
 from analysis.paper_claims.claim import SEEDS, Missing, Number
 from analysis.results import Replicate, Results
 from analysis.studies import stored
@@ -51,7 +50,7 @@ def mean_of(values, over: str) -> Number:
 
 def first_and_last(run, column: str, statistic: str = "mean") -> tuple[float, float]:
     """A statistic of the training episodes in the first and the last tenth of a run's training."""
-    parts = binned(run.episodes, column, run.arguments["total_timesteps"], statistic, PARTS)
+    parts = run.course(column, statistic, PARTS)
     return parts[0], parts[-1]
 
 

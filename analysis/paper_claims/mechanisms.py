@@ -18,7 +18,7 @@ from analysis.paper_claims.claim import (
 )
 from analysis.paper_claims.evidence import FRONTS, difference, mean_of, only, optional, seeds
 from analysis.studies.mechanism_pairs import ALL_ON, PAIRS, effects
-from analysis.tables.common import mean_of_years, paper
+from analysis.tables.common import paper
 from analysis.tables.growing_season_correlations import SEASON_PAIRS, correlations
 from analysis.tables.thaw_formulations import replicates_of, run_numbers
 
@@ -37,7 +37,7 @@ def formulation(evidence, name: str, function) -> pd.DataFrame:
 
 def warming(one) -> dict:
     """Heat into the ground under a run's policy [MJ m-2 yr-1]."""
-    return mean_of_years(one, ["boundary_warming_mj_m2"])
+    return one.mean_of_years(["boundary_warming_mj_m2"])
 
 
 @claim(
@@ -101,7 +101,7 @@ def asymmetric_avoids_warming(evidence):
 )
 def warming_is_small(evidence):
     flux = seeds(formulation(evidence, "asymmetric", warming)["boundary_warming_mj_m2"])
-    zero = mean_of_years(evidence.replicates("main", "zero_change")[0], ["boundary_warming_mj_m2"])
+    zero = evidence.replicates("main", "zero_change")[0].mean_of_years(["boundary_warming_mj_m2"])
     rows = [
         Row("warming [MJ/m2/yr]", "about 0.1", flux),
         Row("warming of zero change", "", Number(zero["boundary_warming_mj_m2"])),

@@ -7,21 +7,13 @@ from math import factorial
 import numpy as np
 import pandas as pd
 
-from analysis import metrics
+from analysis import methods, metrics
 from analysis.paper_claims.claim import CONTRADICTS, UNTESTABLE, Answer, Row, claim, finding, short
 from analysis.tables.common import paper
 from analysis.tables.main_results import paper_rows
 
 TITLE = "The paper's tables against each other"
-NAMES = {
-    "curriculum_ppo": "Curriculum PPO",
-    "ppo_gated": "PPO Gated",
-    "eupg_variable_lambda": "Variable λ EUPG",
-    "target_density": "target density",
-    "conifer_restoration": "conifer restoration",
-    "zero_density_change": "zero change",
-    "plus_100_density": "+100 a year",
-}
+NAMES = {method.paper: method.title for method in methods.ROWS}
 # pairs of weights behind the percentages of violations, by the weights that the paper shows
 PAIRS = {"curriculum_ppo": 4, "fixed_weight_eupg": 4, "eupg_variable_lambda": 9, "ppo_gated": 5}
 
@@ -76,7 +68,7 @@ def scalarised(evidence):
     rows, same = [], []
     for method, table in details().items():
         printed = paper("main_results", index_col="method").scalarized_mean[method]
-        ours = metrics.scalarize(table.carbon_mean, table.thaw_mean, table.lambda_carbon).mean()
+        ours = metrics.scalarize(front(table), metrics.pair(table.lambda_carbon)).mean()
         rows.append(Row(f"scalarised, {NAMES[method]}", f"{short(printed)} printed", f"{short(ours)} from its details"))
         same.append(abs(ours - printed) <= 0.0501)
     return finding(rows, Answer(all(same), "all agree within the rounding of one decimal"), CONTRADICTS)
@@ -91,9 +83,9 @@ def scalarised(evidence):
 def spreads(evidence):
     rows, possible = [], []
     for method, table in details().items():
-        w = table.lambda_carbon
-        most = metrics.scalarize(table.carbon_std, table.thaw_std, w)
-        means = metrics.scalarize(table.carbon_mean, table.thaw_mean, w)
+        weights = metrics.pair(table.lambda_carbon)
+        most = metrics.scalarize(table[["carbon_std", "thaw_std"]].to_numpy(), weights)
+        means = metrics.scalarize(front(table), weights)
         bound = np.sqrt((most**2).mean() + means.var(ddof=0))
         printed = paper("main_results", index_col="method").scalarized_std[method]
         rows.append(
@@ -118,7 +110,7 @@ def spreads(evidence):
 def heuristic_hypervolumes(evidence):
     table, rows, possible = paper("main_results"), [], []
     for row in table[table.kind == "heuristic"].itertuples():
-        side = max(row.scalarized_mean - metrics.REFERENCE_POINT[0], 0.0)
+        side = max(row.scalarized_mean - metrics.REFERENCE_POINT, 0.0)
         rows.append(
             Row(
                 f"hypervolume, {NAMES[row.method]} (scalarised {short(row.scalarized_mean)})",
@@ -245,7 +237,7 @@ def violations_by_chance(evidence):
         chance = chance_of_at_most(printed[method], pairs)
         rows.append(
             Row(
-                f"{NAMES.get(method, 'Fixed λ EUPG')}, {pairs} pairs",
+                f"{NAMES[method]}, {pairs} pairs",
                 f"{short(printed[method])} %",
                 f"noise: {short(expected)} % on average; as few or fewer in {short(100 * chance)} % of cases",
             )

@@ -2,17 +2,16 @@
 
 import pandas as pd
 
-from analysis import metrics
+from analysis import methods, metrics
 from analysis.paper_claims.asymmetry import share
 from analysis.paper_claims.claim import LEAST, Missing, Number, Row, about, above, all_of, below, claim, finding, short
 from analysis.paper_claims.evidence import difference, first_and_last, mean_of, only, optional, seeds
-from analysis.results import METHODS as PAPER_NAMES
-from analysis.results import TITLES
 from analysis.tables.common import paper
 
 TITLE = "Performance on all sites"
 MAIN = only("main")
-HEURISTICS = ("target_density", "conifer_restoration", "zero_change", "plus_100")
+ORDER = list(paper("main_results").method)
+HEURISTICS = sorted(methods.scripts(methods.HEURISTIC), key=lambda script: ORDER.index(methods.paper_name(script)))
 CURRICULUM, GATED, EUPG = "ppo_curriculum", "ppo_gated", "eupg_var_lambda"
 LEVEL = (
     "Ours and the paper's returns are of two simulators. Here most of a thaw return is the site's own heat flow; "
@@ -23,7 +22,7 @@ LEVEL = (
 
 def published(script: str) -> pd.Series:
     """A script's row of the paper's main table."""
-    return paper("main_results", index_col="method").loc[PAPER_NAMES[script]]
+    return paper("main_results", index_col="method").loc[methods.paper_name(script)]
 
 
 def scalarised(evidence, script: str) -> pd.Series:
@@ -35,7 +34,7 @@ def value_claim(script: str):
     """The claim on a method's scalarised reward."""
 
     @claim(
-        f"{TITLES[script]} reaches a scalarised reward of {published(script).scalarized_mean:g}.",
+        f"{methods.title(script)} reaches a scalarised reward of {published(script).scalarized_mean:g}.",
         "Table 2, figure 3b",
         MAIN,
         why=LEVEL,
@@ -117,7 +116,7 @@ def beats_heuristics(method: str):
     """The claim that a method is better than every heuristic."""
 
     @claim(
-        f"{TITLES[method]} is better than every heuristic.",
+        f"{methods.title(method)} is better than every heuristic.",
         "Table 2",
         MAIN,
         why="Planting every year gains in both objectives, and needs no learning; among constant plans there are "
@@ -130,13 +129,13 @@ def beats_heuristics(method: str):
         apart = seeds(scalarised(evidence, method) - scalarised(evidence, best).iloc[0])
         rows = [
             Row(
-                f"scalarised, {TITLES[script]}",
+                f"scalarised, {methods.title(script)}",
                 short(published(script).scalarized_mean),
                 Number(scalarised(evidence, script).iloc[0]),
             )
             for script in HEURISTICS
         ]
-        rows.append(Row(f"{TITLES[method]} less the best of them", short(papers), apart))
+        rows.append(Row(f"{methods.title(method)} less the best of them", short(papers), apart))
         return finding(rows, above(apart, least=LEAST, what="the difference"))
 
     return better
@@ -188,7 +187,11 @@ def targets_are_better(evidence):
     numbers = {script: gain(evidence, script) for script in ("target_density", "conifer_restoration")}
     zero = published("zero_change").scalarized_mean
     rows = [
-        Row(f"scalarised, {TITLES[script]} less zero change", short(published(script).scalarized_mean - zero), number)
+        Row(
+            f"scalarised, {methods.title(script)} less zero change",
+            short(published(script).scalarized_mean - zero),
+            number,
+        )
         for script, number in numbers.items()
     ]
     return finding(rows, all_of(*(above(number) for number in numbers.values())))
@@ -207,10 +210,10 @@ def coverage(evidence):
     gains = {script: evidence.metric("gain_hypervolume", "main", script) for script in (CURRICULUM, GATED)}
     apart = difference(gains[CURRICULUM], gains[GATED])
     rows = [
-        Row(f"hypervolume of returns, {TITLES[script]}", f"{published(script).hypervolume:g}", returns[script])
+        Row(f"hypervolume of returns, {methods.title(script)}", f"{published(script).hypervolume:g}", returns[script])
         for script in returns
     ]
-    rows += [Row(f"hypervolume of gains, {TITLES[script]}", "", seeds(gains[script])) for script in gains]
+    rows += [Row(f"hypervolume of gains, {methods.title(script)}", "", seeds(gains[script])) for script in gains]
     rows.append(Row("hypervolume of gains, Curriculum less Gated", "above 0", apart))
     return finding(rows, above(apart, what="the difference of gains"))
 
@@ -225,7 +228,7 @@ def heuristics_miss_the_front(evidence):
     gains = {script: evidence.metric("gain_hypervolume", "main", script).iloc[0] for script in HEURISTICS}
     best = max(gains, key=gains.get)
     apart = seeds(evidence.metric("gain_hypervolume", "main", CURRICULUM) - gains[best])
-    rows = [Row(f"hypervolume of gains, Curriculum less {TITLES[best]} (the best heuristic)", "above 0", apart)]
+    rows = [Row(f"hypervolume of gains, Curriculum less {methods.title(best)} (the best heuristic)", "above 0", apart)]
     return finding(rows, above(apart, what="the difference"))
 
 
@@ -250,8 +253,7 @@ def thaw_is_positive(evidence):
 
 def net_cooling(one) -> dict:
     """Heat through the boundary out of the ground less into it [MJ m-2 yr-1], lowest of the kept weights."""
-    years = one.years(["boundary_cooling_mj_m2", "boundary_warming_mj_m2"])
-    means = years.groupby(["preference", "variable"])["mean"].mean().unstack()
+    means = one.years.groupby("preference")[["boundary_cooling_mj_m2", "boundary_warming_mj_m2"]].mean()
     return {"cooling": (means.boundary_cooling_mj_m2 - means.boundary_warming_mj_m2).min()}
 
 
@@ -272,7 +274,7 @@ def curriculum_scatters_less(evidence):
     ratio = seeds((scatter[CURRICULUM] / scatter[GATED])[common])
     rows = [
         Row(
-            f"standard deviation over episodes, {TITLES[script]}",
+            f"standard deviation over episodes, {methods.title(script)}",
             f"{published(script).scalarized_std:g}",
             seeds(scatter[script]),
         )

@@ -2,6 +2,7 @@
 
 import pandas as pd
 
+from analysis import methods
 from analysis.paper_claims.claim import (
     LEAST,
     QUARTER,
@@ -18,8 +19,6 @@ from analysis.paper_claims.claim import (
 )
 from analysis.paper_claims.evidence import difference, main_metrics, only, optional, seeds
 from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED
-from analysis.results import METHODS as PAPER_NAMES
-from analysis.results import TITLES
 from analysis.tables.common import paper
 from analysis.tables.lambda_violations import violations
 
@@ -47,7 +46,9 @@ def follows(evidence, experiment: str, script: str, **flags):
 
 def paper_change(script: str) -> tuple[float, float]:
     """The same change in the paper's details."""
-    table = paper("detailed_objectives", index_col="method").loc[PAPER_NAMES[script]].sort_values("lambda_carbon")
+    table = (
+        paper("detailed_objectives", index_col="method").loc[methods.paper_name(script)].sort_values("lambda_carbon")
+    )
     return tuple(table[f"{name}_mean"].iloc[-1] - table[f"{name}_mean"].iloc[0] for name in ("carbon", "thaw"))
 
 
@@ -166,16 +167,16 @@ def curriculum_violates_least(evidence):
             ("noise_violations_percent", ", without ties, in random order"),
             ("significant_violations_percent", ", beyond their interval"),
         ):
-            papers = "" if what else f"{printed[PAPER_NAMES[script]]:g}"
+            papers = "" if what else f"{printed[methods.paper_name(script)]:g}"
             ours = optional(lambda script=script, name=name: seeds(violation(evidence, script, name)))
-            rows.append(Row(f"violations %, {TITLES[script]}{what}", papers, ours))
+            rows.append(Row(f"violations %, {methods.title(script)}{what}", papers, ours))
     answers = []
     for other in (GATED, EUPG):
-        papers = printed[PAPER_NAMES[CURRICULUM]] - printed[PAPER_NAMES[other]]
+        papers = printed[methods.paper_name(CURRICULUM)] - printed[methods.paper_name(other)]
         apart = difference(
             *(violation(evidence, script, "violations_or_ties_percent") for script in (CURRICULUM, other))
         )
-        rows.append(Row(f"Curriculum less {TITLES[other]}", short(papers), apart))
+        rows.append(Row(f"Curriculum less {methods.title(other)}", short(papers), apart))
         answers.append(below(apart, least=QUARTER * abs(papers), what="each difference"))
     return finding(rows, all_of(*answers))
 

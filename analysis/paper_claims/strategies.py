@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from analysis import metrics
-from analysis.figures.common import by_year
+from analysis import methods
 from analysis.paper_claims.claim import (
     CONTRADICTS,
     LEAST,
@@ -23,7 +22,7 @@ from analysis.paper_claims.claim import (
 from analysis.paper_claims.evidence import difference, first_and_last, only, optional, seeds
 from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED
 from analysis.paper_claims.preference import APART, change
-from analysis.results import TITLES
+from analysis.results import by_year
 from analysis.tables.common import paper
 from analysis.tables.learned_strategies import numbers
 
@@ -54,10 +53,10 @@ def strategy(evidence, script: str, name: str) -> pd.Series:
 def conifer_fractions(evidence):
     ours = {script: seeds(strategy(evidence, script, "final_conifer_fraction")) for script in FRACTIONS}
     rows = [
-        Row(f"conifer fraction in the last year, {TITLES[script]}", f"{low} - {high}", ours[script])
+        Row(f"conifer fraction in the last year, {methods.title(script)}", f"{low} - {high}", ours[script])
         for script, (low, high) in FRACTIONS.items()
     ]
-    answers = (about(ours[script], *FRACTIONS[script], what=TITLES[script]) for script in FRACTIONS)
+    answers = (about(ours[script], *FRACTIONS[script], what=methods.title(script)) for script in FRACTIONS)
     return finding(rows, all_of(*answers))
 
 
@@ -65,7 +64,7 @@ def ordered(evidence, name: str, first: str, second: str, what: str, papers: str
     """The finding on one method having more of something than another."""
     values = {script: strategy(evidence, script, name) for script in (first, second)}
     apart = difference(values[first], values[second])
-    rows = [Row(f"{what}, {TITLES[script]}", "", seeds(values[script])) for script in values]
+    rows = [Row(f"{what}, {methods.title(script)}", "", seeds(values[script])) for script in values]
     rows.append(Row("difference", papers, apart))
     return finding(rows, above(apart, least=least, what="the difference"))
 
@@ -111,7 +110,7 @@ def eupg_does_little(evidence):
     apart = seeds(done[EUPG] / done["random_valid"].iloc[0])
     rows = [
         Row(
-            f"planted and thinned [stems/ha/yr], {TITLES[script]}",
+            f"planted and thinned [stems/ha/yr], {methods.title(script)}",
             "minimal" if script == EUPG else "",
             seeds(done[script]),
         )
@@ -142,7 +141,7 @@ def early_growth(evidence):
 
 def mean_gains(one) -> dict:
     """Mean gains of a replicate over zero change; empty if that was not evaluated."""
-    return {} if one.gains is None else one.gains[metrics.OBJECTIVES].mean().to_dict()
+    return {} if one.gains is None else one.gains[["carbon_return", "thaw_return"]].mean().to_dict()
 
 
 def gain(evidence, script: str, objective: str) -> pd.Series:
@@ -177,7 +176,7 @@ def curriculum_protects(evidence):
     papers = table["curriculum_ppo"] - table["ppo_gated"]
     apart = difference(gain(evidence, CURRICULUM, "thaw_return"), gain(evidence, GATED, "thaw_return"))
     rows = [
-        Row(f"thaw gain, {TITLES[script]}", "", seeds(gain(evidence, script, "thaw_return")))
+        Row(f"thaw gain, {methods.title(script)}", "", seeds(gain(evidence, script, "thaw_return")))
         for script in (CURRICULUM, GATED)
     ]
     rows.append(Row("Curriculum less Gated", short(papers), apart))
@@ -186,9 +185,8 @@ def curriculum_protects(evidence):
 
 def older_deciduous(one) -> dict:
     """Mature and old deciduous stems in the last year, mean over the kept weights."""
-    years = one.years(OLDER)
-    last = years[years.year == years.year.max()]
-    return {"stems": last.groupby("variable")["mean"].mean().sum()}
+    last = one.years[one.years.year == one.years.year.max()]
+    return {"stems": last[OLDER].mean().sum()}
 
 
 @claim(
@@ -202,11 +200,11 @@ def eupg_keeps_old_trees(evidence):
     stems = {script: evidence.by_seed(older_deciduous, "main", script)["stems"] for script in FRACTIONS}
     apart = [difference(stems[EUPG], stems[other]) for other in (GATED, CURRICULUM)]
     rows = [
-        Row(f"mature and old deciduous stems/ha, last year, {TITLES[script]}", "", seeds(stems[script]))
+        Row(f"mature and old deciduous stems/ha, last year, {methods.title(script)}", "", seeds(stems[script]))
         for script in stems
     ]
     rows += [
-        Row(f"EUPG less {TITLES[other]}", "above 0", number)
+        Row(f"EUPG less {methods.title(other)}", "above 0", number)
         for other, number in zip((GATED, CURRICULUM), apart, strict=True)
     ]
     return finding(rows, all_of(*(above(number, what="each difference") for number in apart)))
@@ -227,7 +225,7 @@ def density_generalises(evidence):
     apart = difference(shift[EUPG], shift[GATED])
     rows = [
         Row(
-            f"density at evaluation against late training, difference in %, {TITLES[script]}",
+            f"density at evaluation against late training, difference in %, {methods.title(script)}",
             "small" if script == GATED else "large",
             seeds(shift[script]),
         )

@@ -9,7 +9,6 @@ results/studies/constant_plans.csv and constant_plans_of_sites.csv, one row an e
 
 import contextlib
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
@@ -17,12 +16,13 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import experiments, results
+from analysis import experiments, metrics, paths
+from analysis.reduction import PRIMARY
 from analysis.studies import open_loop, stored
 from analysis.studies.measure_balance import where_valid
 from cleanrl_style import protocol
 
-ENVIRONMENTS, ONE_SITE = ("boreal-generalist-v0", "boreal-balanced-v0"), "boreal-site-specific-v0"
+ENVIRONMENTS = ("boreal-generalist-v0", "boreal-balanced-v0")
 PLANTING = tuple(range(15, 25))  # +50 and +100, five mixes each
 DENSE_CONIFER = 24
 
@@ -39,14 +39,13 @@ class Args:
 
 def study(env_id: str, episodes: int) -> pd.DataFrame:
     """Returns of every planting action on the episodes of the evaluation."""
-    args = SimpleNamespace(env_id=env_id, mode="generalist", thaw_formulation="asymmetric", eval_episodes=episodes)
-    tables = []
+    task, tables = protocol.Task.of(env_id), []
     for action in PLANTING:
 
         def probabilities(observations, masks, accrued_returns, action=action):
             return np.eye(sim.management.NUM_ACTIONS)[where_valid(masks, action)]
 
-        table, _ = protocol.evaluate(args, {}, probabilities, (0.0,), ("sampled",))
+        table, _ = protocol.evaluate(task, probabilities, (0.0,), episodes, (PRIMARY,))
         tables.append(table.assign(env_id=env_id, action=action))
     return pd.concat(tables)[["env_id", "action", "episode", "seed", "carbon_return", "thaw_return"]]
 
@@ -55,12 +54,12 @@ def study_of_sites(seeds) -> pd.DataFrame:
     """Returns of every action every year where it can be carried out, on single sites."""
     actions, tables = np.arange(sim.management.NUM_ACTIONS), []
     for seed in seeds:
-        with contextlib.closing(gym.make_vec(ONE_SITE, num_envs=len(actions), site_seed=seed)) as envs:
-            observations, _ = envs.reset(seed=0)  # the preference alone comes of it
+        with contextlib.closing(gym.make_vec(experiments.ONE_SITE, num_envs=len(actions), site_seed=seed)) as envs:
+            envs.reset(seed=0)  # the preference alone comes of it
             returns = np.zeros((len(actions), 2))
             for _ in range(boreal_env.DEFAULT_YEARS):
-                valid = protocol.action_masks(envs, observations, ONE_SITE)[actions, actions]
-                observations, rewards, *_ = envs.step(np.where(valid, actions, boreal_env.NO_CHANGE))
+                valid = envs.action_masks()[actions, actions]
+                _, rewards, *_ = envs.step(np.where(valid, actions, boreal_env.NO_CHANGE))
                 returns += rewards
         tables.append(
             pd.DataFrame(
@@ -83,7 +82,8 @@ def as_evaluation(plans: pd.DataFrame, weights, best: bool) -> pd.DataFrame:
     """
     rows = []
     for weight in weights:
-        scalarized = protocol.scalarize(plans.carbon_return, plans.thaw_return, weight)
+        returns = plans[["carbon_return", "thaw_return"]].to_numpy()
+        scalarized = pd.Series(protocol.scalarize(returns, metrics.pair(weight)), plans.index)
         action = scalarized.groupby(plans.action).mean().idxmax() if best else DENSE_CONIFER
         chosen = plans.action == action
         rows.append(plans[chosen].assign(preference=weight, scalarized_return=scalarized[chosen]))
@@ -93,7 +93,7 @@ def as_evaluation(plans: pd.DataFrame, weights, best: bool) -> pd.DataFrame:
 def main(args: Args) -> None:
     """Evaluate the plans, but for what is there."""
     args = replace(args, eval_episodes=2) if args.quick else args
-    folder = results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR
+    folder = paths.studies(args.quick)
     sites = experiments.SITE_SEEDS[: 1 if args.quick else None]
     physics = open_loop.fingerprint()
     tables = {

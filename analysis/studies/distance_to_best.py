@@ -2,11 +2,11 @@
 
     python analysis/studies/distance_to_best.py [--runs-dir runs]
 
-Trained agents (finished runs with their checkpoint) and fixed strategies play the sites, weathers and first stands on
+Trained agents (finished runs with their policy.pt) and fixed strategies play the sites, weathers and first stands on
 which the plans of results/fronts are reported; what counts are gains over zero change on the same site and weather.
 The plans were sought for their site alone but know no weather and do not look at the stand; an agent of all sites has
 to know the site from its observation. Leaves results/studies/distance_to_best.csv, to which each call adds the runs
-that it does not have: checkpoints are in no archive, the table is.
+that it does not have: most agents are in no archive, the table is.
 """
 
 import hashlib
@@ -14,22 +14,25 @@ import importlib
 import json
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
+import gymnasium as gym
 import numpy as np
 import pandas as pd
 
 import boreal_env
 import sim
-from analysis import experiments, metrics, results, runs
+from analysis import experiments, methods, metrics, paths, runs
+from analysis.reduction import PRIMARY
 from analysis.studies import open_loop, stored
+from analysis.studies.open_loop import GAINS, RETURNS, with_gains
 from cleanrl_style import protocol
 from cleanrl_style.protocol import evaluation
 
-FRONTS_DIR = Path("results/fronts")
+FRONTS_DIR = paths.results() / "fronts"
 WEIGHTS = experiments.WEIGHTS
-RETURNS, GAINS = ([f"{name}_{what}" for name in open_loop.OBJECTIVES] for what in ("return", "gain"))
 BEST_OF_SITE, BEST_OF_ALL = "best constant plan of the site", "best constant plan of all sites"
 WITHOUT_SITE = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
 
@@ -47,7 +50,7 @@ class Args:
     """Compares agents and fixed strategies with the best known plans of each site."""
 
     runs_dir: Path | None = None
-    """folder that holds runs with checkpoints, at any depth (None: runs, or runs/quick)"""
+    """folder that holds runs with agents, at any depth (None: runs, or runs/quick)"""
     overwrite: bool = False
     """evaluate the runs found again, though the table has them; start over if the physics is another"""
     quick: bool = False
@@ -79,14 +82,6 @@ def read_plans(folder: Path, physics: str, sites=None, weathers: int | None = No
     return plans
 
 
-def with_gains(table: pd.DataFrame) -> pd.DataFrame:
-    """A site's plans with GAINS: returns less those of zero change on the same weather."""
-    unchanged = table[[set(actions.split()) == {str(boreal_env.NO_CHANGE)} for actions in table.actions]]
-    reference = unchanged[unchanged.kind == "constant"].set_index("weather")[RETURNS]
-    gains = table[RETURNS].to_numpy() - reference.loc[table.weather].to_numpy()
-    return table.assign(**dict(zip(GAINS, gains.T, strict=True)))
-
-
 def gains_of(plans: pd.DataFrame) -> np.ndarray:
     """Gains of a site's plans, found and constant, (plans, weathers, 2)."""
     ordered = plans.sort_values(["kind", "actions", "weather"])[GAINS].to_numpy()
@@ -95,7 +90,7 @@ def gains_of(plans: pd.DataFrame) -> np.ndarray:
 
 def best_at(gains: np.ndarray, weight: float) -> dict:
     """The best mean scalarised gain of plans (plans, weathers, 2), and its standard error over the weathers."""
-    scalarized = protocol.scalarize(gains[..., 0], gains[..., 1], weight)
+    scalarized = protocol.scalarize(gains, metrics.pair(weight))
     best = scalarized[scalarized.mean(axis=1).argmax()]
     return {"best_scalarized_gain": best.mean(), "best_scalarized_gain_error": best.std(ddof=1) / np.sqrt(len(best))}
 
@@ -117,7 +112,8 @@ def constant_plans(plans: dict[int, pd.DataFrame], weights) -> pd.DataFrame:
     )
     rows = []
     for weight in weights:
-        scalarized = protocol.scalarize(means[GAINS[0]], means[GAINS[1]], weight).unstack("actions")
+        scalarized = pd.Series(protocol.scalarize(means[GAINS].to_numpy(), metrics.pair(weight)), means.index)
+        scalarized = scalarized.unstack("actions")
         for method, chosen in (
             (BEST_OF_SITE, scalarized.idxmax(axis=1)),
             (BEST_OF_ALL, dict.fromkeys(plans, scalarized.mean().idxmax())),
@@ -125,7 +121,7 @@ def constant_plans(plans: dict[int, pd.DataFrame], weights) -> pd.DataFrame:
             for site, table in plans.items():
                 plan = table[(table.kind == "constant") & (table.actions == chosen[site])]
                 gains = plan.sort_values("weather")[GAINS].to_numpy()
-                where = {"method": method, "site": site, "policy": "sampled", "weight": weight}
+                where = {"method": method, "site": site, "policy": PRIMARY, "weight": weight}
                 rows.append(where | means_of(gains, weight))
     return pd.DataFrame(rows)
 
@@ -156,6 +152,7 @@ def play(policy, kwargs: dict, sites: list[int], weathers: list[int], weights, g
 
     kwargs : of the environment; played : called with the number of episodes just played.
     """
+    task = protocol.Task.of(experiments.GENERALIST, **kwargs)
     cases = [(weight, site, weather) for weight in weights for site in sites for weather in weathers]
     returns = []
     for first in range(0, len(cases), evaluation.CHUNK):
@@ -163,15 +160,15 @@ def play(policy, kwargs: dict, sites: list[int], weathers: list[int], weights, g
         envs = OnSites(list(zip(*where, strict=True)), **kwargs)
         # the policy's dice: the same for every weight and method, another stream for each site and weather
         seeds = [1000 * (site - open_loop.FIRST_SITE_SEED) + weather for site, weather in zip(*where, strict=True)]
-        env_id = "boreal-generalist-v0"
-        returns.append(evaluation.play(envs, env_id, policy, np.array(preferences), seeds, greedy)[0])
+        weights_of_each = metrics.pair(np.array(preferences, dtype=float))
+        returns.append(evaluation.play(task, envs, policy, weights_of_each, seeds, greedy)[0])
         played(len(seeds))
     return np.concatenate(returns).reshape(len(weights), len(sites), len(weathers), 2)
 
 
 def means_of(gains: np.ndarray, weight: float) -> dict:
     """Mean gains over the weathers, gains (weathers, 2), and the standard error of the scalarised one."""
-    scalarized = protocol.scalarize(gains[:, 0], gains[:, 1], weight)
+    scalarized = protocol.scalarize(gains, metrics.pair(weight))
     error = scalarized.std(ddof=1) / np.sqrt(len(scalarized))
     # rounded so that a table that is read and written again keeps its digits
     return dict(zip(PLAYED, np.round([*gains.mean(axis=0), scalarized.mean(), error], 6), strict=True))
@@ -185,7 +182,7 @@ def judge(policy, kwargs: dict, plans: dict[int, pd.DataFrame], weights, learnt:
     sites = list(plans)
     weathers = sorted(set(plans[sites[0]].weather))
     rows = []
-    for kind in protocol.POLICIES if learnt else ("sampled",):
+    for kind in protocol.POLICIES if learnt else (PRIMARY,):
         returns = play(policy, kwargs, sites, weathers, weights if learnt else (0.0,), kind == "greedy", played)
         returns = np.broadcast_to(returns, (len(weights), *returns.shape[1:]))
         for k, site in enumerate(sites):
@@ -210,27 +207,9 @@ def strategy(name: str):
 
 
 def agent_policy(folder: Path, config: dict):
-    """A run's agent, from the class of its script and its checkpoint, as a policy of the evaluation."""
-    import torch  # only here: reading the table does without
-
-    module = importlib.import_module(f"cleanrl_style.{config['script']}")
-    arguments = config["arguments"]
-    kwargs = {"observation_groups": WITHOUT_SITE} if arguments.get("hide_site", False) else {}
-    spaces = SimpleNamespace(single_observation_space=boreal_env.BorealVectorEnv(1, **kwargs).single_observation_space)
-    two_values = arguments.get("per_objective_advantages", False)
-    agent = module.Agent(spaces, 2) if two_values else module.Agent(spaces)
-    agent.load_state_dict(torch.load(folder / "checkpoint.pt", weights_only=False)["agent"])
-    torch.set_num_threads(1)
-
-    def probabilities(observations, masks, accrued_returns):
-        if hasattr(module, "policy_input"):
-            x = module.policy_input(observations, accrued_returns)
-        else:
-            x = torch.from_numpy(observations)
-        with torch.no_grad():
-            return agent.get_distribution(x, torch.from_numpy(masks)).probs.numpy()
-
-    return probabilities, kwargs
+    """A run's agent as a policy of the evaluation, and arguments of the environment that give what it observes."""
+    kwargs = {"observation_groups": WITHOUT_SITE} if config["arguments"].get("hide_site", False) else {}
+    return protocol.load_agent(folder), kwargs
 
 
 # ------------------------------------------------------------------------------------------------- the table
@@ -243,7 +222,7 @@ def name_of(config: dict) -> dict:
     names = (
         config["script"],
         arguments["env_id"],
-        runs.setting(config["not_default"], arguments["env_id"]),
+        runs.setting(config["not_default"], arguments["mode"]),
         arguments["seed"],
         arguments["site_seed"],
         arguments.get("preference"),
@@ -252,15 +231,25 @@ def name_of(config: dict) -> dict:
     return dict(zip(AGENT, as_text, strict=True)) | {"run": hashlib.sha256(text.encode()).hexdigest()[:12]}
 
 
+@cache
+def is_of_many_sites(env_id: str) -> bool:
+    """Whether an environment is ours, generalist, and pays carbon and thaw."""
+    try:
+        task = protocol.Task.of(env_id)
+    except (gym.error.Error, ModuleNotFoundError, ValueError):
+        return False
+    return task.boreal and task.mode == "generalist" and list(task.objectives) == list(open_loop.OBJECTIVES)
+
+
 def agents(folder: Path, sites) -> list[tuple[Path, dict]]:
-    """Finished runs with a checkpoint below a folder, of scripts that are here.
+    """Finished runs with an agent below a folder, of scripts that are here.
 
     Agents of one site count if it is one of the sites; those of the site-specific mode do not: they know one weather
     and no temperature noise.
     """
     found = []
     for path in runs.run_folders(folder):
-        if not (path / "checkpoint.pt").exists() or runs.table_path(path, "evaluation") is None:
+        if not (path / "policy.pt").exists() or not runs.is_finished(path):
             continue
         try:
             config = runs.read_config(path)
@@ -268,9 +257,8 @@ def agents(folder: Path, sites) -> list[tuple[Path, dict]]:
             print(f"left out: {path}: {error}", file=sys.stderr)
             continue
         arguments = config["arguments"]
-        generalist = protocol.MODES.get(arguments["env_id"]) == "generalist"
         here = (experiments.ROOT / "cleanrl_style" / f"{config['script']}.py").exists()
-        if here and generalist and arguments["site_seed"] in (None, *sites):
+        if here and arguments["site_seed"] in (None, *sites) and is_of_many_sites(arguments["env_id"]):
             found.append((path, config))
     return found
 
@@ -319,7 +307,7 @@ def main(args: Args) -> None:
     weights = experiments.QUICK_EVALUATION["eval_weights"] if args.quick else WEIGHTS
     weathers = sorted(set(next(iter(plans.values())).weather))
     settings = {"sites": list(plans), "weathers": weathers, "weights": weights, "physics": physics}
-    path = (results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR) / "distance_to_best.csv"
+    path = paths.studies(args.quick) / "distance_to_best.csv"
     table = pd.DataFrame(columns=[*KEY, *PLAYED])
     if stored.is_finished(path, settings):
         table = stored.read(path, text=TEXT)
@@ -331,9 +319,9 @@ def main(args: Args) -> None:
     table = pd.concat([table, constant.assign(**dict.fromkeys(AGENT[1:], ""))], ignore_index=True)
     todo = [
         (dict.fromkeys([*AGENT, "run"], "") | {"method": name}, (strategy(name), {}), weights)
-        for name in experiments.HEURISTICS
+        for name in methods.STRATEGIES
     ]
-    for folder, config in agents(args.runs_dir or (experiments.QUICK_DIR if args.quick else runs.RUNS_DIR), plans):
+    for folder, config in agents(args.runs_dir or paths.runs(args.quick), plans):
         own = (config["arguments"]["preference"],) if "preference" in config["arguments"] else weights
         todo.append((name_of(config), (folder, config), own))
     if args.quick:

@@ -12,14 +12,15 @@ import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import moocore
 import numpy as np
 import pandas as pd
 
 import sim
+from analysis import paths
 from analysis.metrics import hypervolume
 from analysis.studies import nsga2, open_loop, stored
 from analysis.studies.nsga2 import Budget
+from analysis.studies.open_loop import GAINS, RETURNS, with_gains
 from cleanrl_style import protocol
 
 YEARS = 50
@@ -28,8 +29,6 @@ FULL = Budget(population=36, generations=14, weathers=4, report_weathers=16)
 SMALL = Budget(population=24, generations=8, weathers=2, report_weathers=6)
 QUICK = Budget(population=16, generations=3, weathers=1, report_weathers=2)
 ALL_ON = "all on"
-RETURNS = [f"{name}_return" for name in open_loop.OBJECTIVES]
-GAINS = [f"{name}_gain" for name in open_loop.OBJECTIVES]
 STAND = [
     "density_stems_ha",
     "conifer_fraction",
@@ -105,19 +104,11 @@ def study(site_seed: int, budget: Budget, seed: int, years: int, mechanisms=None
     return table
 
 
-def with_gains(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with GAINS: returns less those of zero change on the same weather."""
-    unchanged = set(table.actions[table.kind == "constant"])
-    zero = next(name for name in unchanged if set(name.split()) == {"12"})
-    reference = table[(table.kind == "constant") & (table.actions == zero)].set_index("weather")[RETURNS]
-    gains = table.copy()
-    gains[GAINS] = table[RETURNS].to_numpy() - reference.loc[table.weather].to_numpy()
-    return gains
-
-
 def plan_means(gains: pd.DataFrame, kind: str) -> pd.DataFrame:
     """Means over the weathers of one kind of plans, those that none of the kind dominates, by rising carbon gain."""
     plans = gains[gains.kind == kind].groupby("actions")[RETURNS + GAINS + STAND].mean()
+    import moocore
+
     front = plans[moocore.is_nondominated(plans[RETURNS].to_numpy(), maximise=True)]
     front = front.assign(conifer_share=front.planted_conifers_ha / front.planted_stems_ha)
     return front.sort_values(GAINS[0])
@@ -180,7 +171,7 @@ def path_of(folder: Path, site_seed: int, mechanism: str) -> Path:
 
 def folder_of(args: Args) -> Path:
     """Where a command's tables are."""
-    folder = args.output_dir or Path("results/quick/fronts" if args.quick else "results/fronts")
+    folder = args.output_dir or paths.results(args.quick) / "fronts"
     return folder / "mechanisms" if args.without_mechanisms else folder
 
 

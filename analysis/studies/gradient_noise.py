@@ -20,7 +20,7 @@ import pandas as pd
 import torch
 
 import boreal_env
-from analysis import results
+from analysis import metrics, paths
 from analysis.studies import open_loop, stored
 from cleanrl_style import eupg_var_lambda as eupg
 from cleanrl_style import protocol
@@ -76,7 +76,7 @@ def play(agent, envs, design: Design) -> Episodes:
         returns, years = np.zeros((envs.num_envs, 2)), []
         for _ in range(design.years):
             x = eupg.policy_input(observations, returns)
-            mask = torch.from_numpy(protocol.action_masks(envs, observations, ENV_ID))
+            mask = torch.from_numpy(boreal_env.action_masks(observations))
             with torch.no_grad():
                 action, *_ = agent.get_action_and_value(x, mask)
             observations, rewards, *_ = envs.step(action.numpy())
@@ -172,7 +172,8 @@ def study(design: Design) -> pd.DataFrame:
                 episodes.actions[site, k],
                 weights.reshape(-1, design.years),
             ).reshape(2, len(cases), -1)
-            own = protocol.scalarize(*both, episodes.preferences[site, k].astype(np.float32))
+            weight = metrics.pair(episodes.preferences[site, k].astype(np.float32))
+            own = protocol.scalarize(np.moveaxis(both, 0, -1), weight)
             gradient = np.stack([*both, own], axis=1)
             means[:, :, site] += gradient / design.episodes
             squares[:, :, site, k] = (gradient.astype(np.float64) ** 2).sum(axis=-1)
@@ -206,7 +207,7 @@ def report(table: pd.DataFrame) -> None:
 def main(args: Args) -> None:
     """Play and analyse, unless the table is there."""
     design = QUICK if args.quick else FULL
-    path = (results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR) / "gradient_noise.csv"
+    path = paths.studies(args.quick) / "gradient_noise.csv"
     settings = {
         **design._asdict(),
         "agent_seed": AGENT_SEED,

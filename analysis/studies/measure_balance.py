@@ -14,7 +14,7 @@ import numpy as np
 import boreal_env
 from baselines_heuristic import conifer_restoration, plus_100, target_density, zero_change
 from cleanrl_style import protocol
-from cleanrl_style.protocol.evaluation import final_info
+from cleanrl_style.protocol import final_info
 
 FIRST_SEED = 2_000_000_000  # met neither in training nor in evaluation
 

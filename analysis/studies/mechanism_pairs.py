@@ -17,7 +17,7 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import results
+from analysis import paths
 from analysis.studies import open_loop, stored
 from cleanrl_style import protocol
 
@@ -164,7 +164,7 @@ def effects(pairs: pd.DataFrame, pair: str, variable: str, off: str = ALL_ON) ->
 def main(args: Args) -> None:
     """Play all pairs, unless the table is there."""
     sites, years = (2, 1) if args.quick else (args.sites, YEARS)
-    folder = results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR
+    folder = paths.studies(args.quick)
     path = folder / "mechanism_pairs.csv"
     settings = {
         "sites": sites,

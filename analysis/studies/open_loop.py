@@ -8,6 +8,7 @@ import hashlib
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 import boreal_env
 import sim
@@ -19,6 +20,7 @@ FIRST_WEATHER_SEED = 4_000_000_000
 CANDIDATES = 400
 
 OBJECTIVES = ("carbon", "thaw")
+RETURNS, GAINS = ([f"{name}_{what}" for name in OBJECTIVES] for what in ("return", "gain"))
 _COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
 _HARVESTABLE = slice(2, None)  # of a species' age classes: young and older, as the environment's default has it
 
@@ -106,6 +108,17 @@ def seeds(site_seed: int, weather: int) -> sim.Seeds:
     """Seeds of an episode: the site's own start, the dice of weather number `weather`."""
     dice = sim.episode_seeds(FIRST_WEATHER_SEED + weather)
     return dice._replace(start=sim.episode_seeds(site_seed).start)
+
+
+def with_gains(plans: pd.DataFrame) -> pd.DataFrame:
+    """A site's plans with GAINS: RETURNS less those of zero change on the same weather.
+
+    plans : a row a plan and weather, with kind, actions (numbers, one a block of years) and weather.
+    """
+    unchanged = plans[[set(actions.split()) == {str(boreal_env.NO_CHANGE)} for actions in plans.actions]]
+    reference = unchanged[unchanged.kind == "constant"].set_index("weather")[RETURNS]
+    gains = plans[RETURNS].to_numpy() - reference.loc[plans.weather].to_numpy()
+    return plans.assign(**dict(zip(GAINS, gains.T, strict=True)))
 
 
 def site_features(site: dict[str, float]) -> dict[str, float]:

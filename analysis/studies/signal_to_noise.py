@@ -18,7 +18,7 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import results
+from analysis import paths
 from analysis.studies import open_loop, stored
 from cleanrl_style import protocol
 
@@ -381,8 +381,8 @@ def report(table: pd.DataFrame) -> None:
 def main(args: Args) -> None:
     """Play and analyse, unless the tables are there."""
     design, years = (QUICK, 12) if args.quick else (FULL, YEARS)
-    folder = results.QUICK_STUDIES_DIR if args.quick else results.STUDIES_DIR
-    paths = [folder / f"signal_to_noise{end}.csv" for end in ("_years", "")]
+    folder = paths.studies(args.quick)
+    files = [folder / f"signal_to_noise{end}.csv" for end in ("_years", "")]
     settings = {
         **design._asdict(),
         "episode_years": years,
@@ -391,15 +391,15 @@ def main(args: Args) -> None:
         "weightings": WEIGHTINGS,
         "physics": open_loop.fingerprint(),
     }
-    if all(stored.is_finished(path, settings) for path in paths):
-        print(f"{paths[-1]} is finished")
-        report(stored.read(paths[-1], text=("year",)))
+    if all(stored.is_finished(path, settings) for path in files):
+        print(f"{files[-1]} is finished")
+        report(stored.read(files[-1], text=("year",)))
         return
     table, curves = study(design, years)
-    for path, one in zip(paths, (curves, table), strict=True):
+    for path, one in zip(files, (curves, table), strict=True):
         stored.write(path, one, settings)
     report(table)
-    print(f"\nwrote {' and '.join(map(str, paths))}")
+    print(f"\nwrote {' and '.join(map(str, files))}")
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def study(curricula: list[results.Replicate], each: int, years: int) -> pd.DataF
     progress = protocol.Progress("sites", len(curricula), "runs")
     for number, curriculum in enumerate(curricula):
         run = curriculum.runs[0]
-        drawn = drawn_episodes(run.episodes, run.arguments["seed"], each)
+        drawn = drawn_episodes(run.tables["sample"], run.arguments["seed"], each)
         sites = [sim.sample_site(int(seed)) for seed in drawn.site_seed]
         seeds = [open_loop.seeds(int(seed), k) for k, seed in enumerate(drawn.site_seed)]
         episodes = open_loop.play(sites, seeds, np.full((len(drawn), years), boreal_env.NO_CHANGE))

@@ -17,11 +17,12 @@ import numpy as np
 import pandas as pd
 
 import boreal_env
-from analysis import experiments, results
+from analysis import metrics, results
+from analysis.methods import LEARNERS
+from analysis.reduction import EVERY
 from analysis.studies import open_loop, stored
 from cleanrl_style import protocol
 
-EVERY = 8
 STREAM = ["num_envs", "seed"]  # what fixes the episodes of a training in generalist mode
 EPISODE = [*STREAM, "env", "global_step"]
 
@@ -36,7 +37,7 @@ class Args:
 
 def streams(found: results.Results) -> dict[tuple[int, int], int]:
     """(number of environments, training seed) of the main experiment's runs -> steps."""
-    runs = [one.runs[0] for script in experiments.METHODS for one in found.of("main", script)]
+    runs = [one.runs[0] for script in LEARNERS for one in found.of("main", script)]
     return {tuple(run.arguments[name] for name in STREAM): run.arguments["total_timesteps"] for run in runs}
 
 
@@ -77,18 +78,14 @@ def gains(run, nothing: pd.DataFrame) -> pd.DataFrame | None:
     nothing : the study's table. Columns: global_step, carbon_gain, thaw_gain, scalarized_gain.
     """
     keys = {name: run.arguments[name] for name in STREAM}
-    both = run.episodes.assign(**keys).merge(nothing, on=EPISODE, suffixes=("", "_nothing"))
+    both = run.tables["sample"].assign(**keys).merge(nothing, on=EPISODE, suffixes=("", "_nothing"))
     if both.empty:
         return None
-    carbon, thaw = (both[f"{name}_return"] - both[f"{name}_return_nothing"] for name in ("carbon", "thaw"))
-    return pd.DataFrame(
-        {
-            "global_step": both.global_step,
-            "carbon_gain": carbon,
-            "thaw_gain": thaw,
-            "scalarized_gain": protocol.scalarize(carbon, thaw, both.preference),
-        }
-    )
+    names = ("carbon", "thaw")
+    gained = np.column_stack([both[f"{name}_return"] - both[f"{name}_return_nothing"] for name in names])
+    table = pd.DataFrame(gained, columns=[f"{name}_gain" for name in names])
+    scalarized = protocol.scalarize(gained, metrics.pair(both.preference))
+    return table.assign(global_step=both.global_step, scalarized_gain=scalarized)
 
 
 def main(args: Args) -> None:
@@ -96,7 +93,7 @@ def main(args: Args) -> None:
     found = results.Results.load(args.quick)
     wanted = streams(found)
     if not wanted:
-        sys.exit(f"error: no finished run; {found.first_job('main', experiments.METHODS[0]).command} makes the first")
+        sys.exit(f"error: no finished run; {found.first_job('main', LEARNERS[0]).command} makes the first")
     every = 1 if args.quick else EVERY
     path = found.studies_dir / "training_gains.csv"
     settings = {"every": every, "physics": open_loop.fingerprint()}

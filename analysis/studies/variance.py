@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 
 import sim
+from analysis import paths
 from analysis.studies import open_loop, stored
 from cleanrl_style import protocol
 
@@ -156,7 +157,7 @@ def main(args: Args) -> None:
         args.sites, args.weathers = 4, 2
     if args.sites < 4 or args.weathers < 2:
         sys.exit(f"variance.py: --sites >= 4 and --weathers >= 2 are allowed, not {args.sites}, {args.weathers}")
-    folder = args.output_dir or Path("results/quick/variance" if args.quick else "results/variance")
+    folder = args.output_dir or paths.results(args.quick) / "variance"
     settings = asdict(args) | {"output_dir": None, "physics": open_loop.fingerprint()}
     site_seeds = [open_loop.FIRST_SITE_SEED + k for k in range(args.sites)]
     rewards = play(site_seeds, args.weathers)

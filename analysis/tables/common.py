@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
+from analysis.experiments import GENERALIST  # noqa: F401
 from cleanrl_style import protocol
 from cleanrl_style.protocol import FLOAT_FORMAT
 
 PAPER_TABLES = Path(__file__).parents[1] / "paper_tables"
-GENERALIST = "boreal-generalist-v0"
 #: The first columns of a table with a row for each method.
 ROW_COLUMNS = {"method": "method", "environment": "environment", "setting": "setting", "seeds": "seeds"}
 
@@ -33,12 +33,6 @@ def over_seeds(values: pd.DataFrame) -> dict:
         row[name] = metrics.iqm(known) if len(known) else np.nan
         row[f"{name}_low"], row[f"{name}_high"] = metrics.bootstrap_interval(known)
     return row
-
-
-def mean_of_years(replicate, variables: list[str]) -> dict:
-    """Mean over the years and the kept weights of columns of the annual record, sampled policy."""
-    table = replicate.years(variables)
-    return table.groupby("variable")["mean"].mean().to_dict()
 
 
 def cell(row: pd.Series, name: str) -> str:

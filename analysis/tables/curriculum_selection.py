@@ -25,7 +25,7 @@ def make(results) -> pd.DataFrame:
     """Accepted, rejected, and their difference within a run."""
     published = paper("curriculum_selection", index_col="site_category")
     curricula = results.of("main", "ppo_curriculum")
-    shares = [100 * one.runs[0].episodes.selected.mean() for one in curricula]
+    shares = [100 * one.runs[0].share_selected for one in curricula]
     share = pd.DataFrame({"share_percent": shares}).astype(float)
     sites, rows = results.study("site_warming"), []
     means = {}

@@ -3,8 +3,7 @@
 import pandas as pd
 
 from analysis import metrics
-from analysis.results import METHODS
-from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Detailed objectives"
 COLUMNS = ROW_COLUMNS | {
@@ -24,31 +23,35 @@ COLUMNS = ROW_COLUMNS | {
 
 def by_weight(one) -> pd.DataFrame:
     """Means of one run, a row per weight."""
-    spread = one.evaluation.groupby("preference")[metrics.OBJECTIVES].std()
-    table = metrics.mean_returns(one.evaluation).join(
-        spread.rename(columns=lambda name: name.replace("return", "sd_over_episodes"))
-    )
+    table = metrics.mean_returns(one.evaluation)
+    spread = metrics.by_weight(one.evaluation)[list(table)].std()
+    table = table.join(spread.rename(columns=lambda name: name.replace("return", "sd_over_episodes")))
     if one.gains is not None:
         gains = metrics.mean_returns(one.gains)
         table = table.join(gains.rename(columns=lambda name: name.replace("return", "gain")))
     return table
 
 
+def row_at(key: tuple, weights: dict, at_weight: pd.DataFrame) -> dict:
+    """A row: statistics over training seeds of the rows of `by_weight` at one weight."""
+    row = row_of(key, len(at_weight)) | weights
+    if at_weight.empty:
+        return row
+    spreads = [column for column in at_weight if "sd_over" in column]
+    return row | over_seeds(at_weight.drop(columns=spreads)) | at_weight[spreads].mean().to_dict()
+
+
 def make(results) -> pd.DataFrame:
     """One row per script, environment, setting and weight; the paper's weights too where ours are others."""
     published = paper("detailed_objectives", index_col=["method", "lambda_carbon"]).add_prefix("paper_")
     rows = []
-    for key, replicates in results.rows.items():
+    for key, replicates in results.rows_of_two_objectives().items():
         tables = [by_weight(one) for one in replicates]
-        name = METHODS.get(key[0])
-        is_papers = results.is_papers(key) and key[1] == GENERALIST and (name, 0.0) in published.index
-        theirs = published.loc[name] if is_papers else published.iloc[:0]
+        name = results.paper_name(key)
+        theirs = published.loc[name] if (name, 0.0) in published.index else published.iloc[:0]
         ours = pd.concat(tables) if tables else pd.DataFrame()
         for weight in sorted({*ours.index, *(theirs.index if tables else ())}):
             at_weight = ours[ours.index == weight]
-            row = row_of(key, len(at_weight)) | {"weight": weight}
-            if len(at_weight):
-                spreads = [column for column in at_weight if "sd_over" in column]
-                row |= over_seeds(at_weight.drop(columns=spreads)) | at_weight[spreads].mean().to_dict()
+            row = row_at(key, {"weight": weight}, at_weight)
             rows.append(row | (theirs.loc[weight].to_dict() if weight in theirs.index else {}))
     return pd.DataFrame(rows, columns=None if rows else list(COLUMNS))

@@ -11,7 +11,7 @@ import pandas as pd
 
 import sim
 from analysis import metrics
-from analysis.experiments import METHODS
+from analysis.methods import LEARNERS
 from analysis.studies.mechanism_pairs import effects
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
@@ -56,12 +56,7 @@ def pair_effects(pairs: pd.DataFrame | None, variable: str) -> dict:
     """Mean effect of a longer season over the sites, upper less lower, with its 95 % interval."""
     row = {}
     for name, pair in SEASON_PAIRS.items() if pairs is not None else ():
-        mean, half_width = metrics.mean_interval(effects(pairs, pair, variable))
-        row |= {
-            f"{name}_effect": mean,
-            f"{name}_effect_low": mean - half_width,
-            f"{name}_effect_high": mean + half_width,
-        }
+        row |= metrics.with_interval(f"{name}_effect", effects(pairs, pair, variable))
     return row
 
 
@@ -70,7 +65,7 @@ def make(results) -> pd.DataFrame:
     published = paper("growing_season_correlations", index_col="variable").r
     pairs = results.study("mechanism_pairs")
     rows = []
-    for key, replicates in results.of_main_and_others(("zero_change", *METHODS)).items():
+    for key, replicates in results.of_main_and_others(("zero_change", *LEARNERS)).items():
         columns = [*VARIABLES, *(f"warm_{name}" for name in VARIABLES), "r_gain"]
         table = pd.DataFrame([correlations(one) for one in replicates], columns=columns).astype(float)
         for variable, its_name in VARIABLES.items():

@@ -1,14 +1,14 @@
 """Adjacent pairs of weights where carbon falls or thaw rises as the carbon weight rises.
 
-Beside them what a policy that ignores the preference would show: the same points in an order drawn at random.
+Of two objectives: the weights of more have no neighbours. Beside them what a policy that ignores the preference would
+show: the same points in an order drawn at random.
 """
 
 import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.results import METHODS
-from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Lambda violations"
 COLUMNS = ROW_COLUMNS | {
@@ -54,13 +54,13 @@ def make(results) -> pd.DataFrame:
         )
     ]
     rows = []
-    for key, replicates in results.rows.items():
+    for key, replicates in results.rows_of_two_objectives().items():
         if not results.is_trained(key):
             continue
         table = pd.DataFrame([violations(one) for one in replicates], columns=names).astype(float)
         row = row_of(key, len(table)) | over_seeds(table.drop(columns="pairs")) | {"pairs": table.pairs.mean()}
-        name = METHODS.get(key[0])
-        if results.is_papers(key) and key[1] == GENERALIST and name in published.index:
+        name = results.paper_name(key)
+        if name in published.index:
             row["paper_violations_percent"] = published[name]
             row["paper_detail_violations_percent"] = details.get(name, np.nan)
         rows.append(row)

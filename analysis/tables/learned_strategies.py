@@ -2,9 +2,8 @@
 
 import pandas as pd
 
-from analysis.experiments import HEURISTICS, METHODS
-from analysis.results import METHODS as PAPER_NAMES
-from analysis.tables.common import ROW_COLUMNS, mean_of_years, over_seeds, paper, row_of
+from analysis.methods import LEARNERS, STRATEGIES
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Learned strategies"
 YEARS = {
@@ -38,11 +37,10 @@ COLUMNS = ROW_COLUMNS | {
 
 def numbers(one) -> dict:
     """Means over the episodes of one run: 50 years for the stand, all weights for the returns."""
-    row = {YEARS[name]: value for name, value in mean_of_years(one, list(YEARS)).items()}
-    years = one.years(["density_stems_ha", "conifer_fraction"])
-    last = years[years.year == years.year.max()].groupby("variable")["mean"].mean()
-    # a run that was evaluated at none of the kept weights has no years here
-    row |= {"final_density": last.get("density_stems_ha"), "final_conifer_fraction": last.get("conifer_fraction")}
+    row = {YEARS[name]: value for name, value in one.mean_of_years(YEARS).items()}
+    # of a run that was evaluated at none of the kept weights these are not numbers
+    last = one.years[one.years.year == one.years.year.max()]
+    row |= {"final_density": last.density_stems_ha.mean(), "final_conifer_fraction": last.conifer_fraction.mean()}
     return row | {"carbon": one.evaluation.carbon_return.mean(), "thaw": one.evaluation.thaw_return.mean()}
 
 
@@ -51,10 +49,10 @@ def make(results) -> pd.DataFrame:
     published = paper("learned_strategies", index_col="method").add_prefix("paper_")
     columns = [name for name in COLUMNS if name not in ROW_COLUMNS and not name.startswith("paper_")]
     rows = []
-    for key, replicates in results.of_main_and_others((*METHODS, *HEURISTICS)).items():
+    for key, replicates in results.of_main_and_others((*LEARNERS, *STRATEGIES)).items():
         table = pd.DataFrame([numbers(one) for one in replicates], columns=columns).astype(float)
         row = row_of(key, len(table)) | over_seeds(table)
-        if PAPER_NAMES.get(key[0]) in published.index:
-            row |= published.loc[PAPER_NAMES[key[0]]].to_dict()
+        if results.paper_name(key) in published.index:
+            row |= published.loc[results.paper_name(key)].to_dict()
         rows.append(row)
     return pd.DataFrame(rows)

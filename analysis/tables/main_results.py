@@ -4,10 +4,9 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.results import METHODS
 from analysis.studies.constant_plans import as_evaluation
 from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
-from cleanrl_style.protocol.evaluation import EVAL_WEIGHTS
+from cleanrl_style.protocol.fronts import evaluation_weights
 
 TITLE = "Main results"
 ENVIRONMENTS = (GENERALIST, "boreal-balanced-v0")
@@ -66,27 +65,27 @@ def run_metrics(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
     }
     if np.ptp(front.to_numpy(), axis=0).any():
         response = metrics.preference_response(evaluation)
-        for objective in ("carbon", "thaw"):
+        for name in response.index:
             for kind in ("change", "slope"):
-                row[f"{objective}_{kind}"] = response.loc[f"{objective}_return", kind]
+                row[name.replace("return", kind)] = response.loc[name, kind]
     return row if gains is None else row | front_metrics(gains, "gain_")
 
 
-NUMBERS = (
-    "scalarized",
-    "hypervolume",
-    "sparsity",
-    "expected_utility",
-    "cardinality",
-    "gain_scalarized",
-    "gain_hypervolume",
-    "gain_sparsity",
-    "carbon_change",
-    "thaw_change",
-    "carbon_slope",
-    "thaw_slope",
-    "sd_over_episodes",
-)
+FRONT = ("scalarized", "hypervolume", "sparsity", "expected_utility", "cardinality")
+GAINS = ("gain_scalarized", "gain_hypervolume", "gain_sparsity")
+
+
+def numbers(objectives) -> list[str]:
+    """What `run_metrics` gives of runs with these objectives."""
+    responses = [f"{name}_{kind}" for kind in ("change", "slope") for name in objectives]
+    return [*FRONT, *GAINS, *responses, "sd_over_episodes"]
+
+
+def row_of_runs(key: tuple, evaluations: list, objectives=("carbon", "thaw")) -> dict:
+    """A row: statistics over training seeds, of the evaluation and the gains of each."""
+    table = pd.DataFrame([run_metrics(*one) for one in evaluations], columns=numbers(objectives))
+    row = row_of(key, len(table)) | over_seeds(table.drop(columns="sd_over_episodes"))
+    return row | {"sd_over_episodes": table.sd_over_episodes.mean()}
 
 
 def paper_rows() -> pd.DataFrame:
@@ -114,7 +113,7 @@ def constant_plans(results) -> dict[tuple, list]:
             key = name, env_id, "default"
             rows[key] = []
             if plans is not None:
-                evaluation = as_evaluation(plans[plans.env_id == env_id], EVAL_WEIGHTS, best)
+                evaluation = as_evaluation(plans[plans.env_id == env_id], evaluation_weights(2), best)
                 rows[key] = [(evaluation, results.gains(evaluation, env_id))]
     return rows
 
@@ -129,10 +128,8 @@ def make(results) -> pd.DataFrame:
     evaluations |= constant_plans(results)
     published, rows = paper_rows(), []
     for key in sorted(evaluations, key=lambda key: ENVIRONMENTS.index(key[1])):
-        table = pd.DataFrame([run_metrics(*one) for one in evaluations[key]], columns=NUMBERS)
-        row = row_of(key, len(table)) | over_seeds(table.drop(columns="sd_over_episodes"))
-        row["sd_over_episodes"] = table.sd_over_episodes.mean()
-        if results.is_papers(key) and key[1] == GENERALIST and METHODS.get(key[0]) in published.index:
-            row |= published.loc[METHODS[key[0]]].to_dict()
+        row = row_of_runs(key, evaluations[key])
+        if results.paper_name(key) in published.index:
+            row |= published.loc[results.paper_name(key)].to_dict()
         rows.append(row)
     return pd.DataFrame(rows)

@@ -68,14 +68,13 @@ def make(results) -> pd.DataFrame:
             apart |= {name: effects(pairs, pair, variable, off) for name, (variable, off) in WITHOUT.items()}
             sites = pairs[(pairs.pair == pair) & (pairs.off == ALL_ON)]
             clipped = sites[["lower_thaw_clipped_years", "upper_thaw_clipped_years"]].max(axis=1) > 0
-            means = {name: metrics.mean_interval(values) for name, values in apart.items()}
-            for name, (mean, half_width) in means.items():
-                row |= {name: mean, f"{name}_low": mean - half_width, f"{name}_high": mean + half_width}
+            for name, values in apart.items():
+                row |= metrics.with_interval(name, values)
             opposed = np.sign(apart["carbon_return"]) * np.sign(apart["thaw_return"]) < 0
             row |= {
                 "sites": len(sites),
                 "clipped_sites": clipped.sum(),
-                "conflict": verdict(means["carbon_return"], means["thaw_return"]),
+                "conflict": verdict(*(metrics.mean_interval(apart[name]) for name in ("carbon_return", "thaw_return"))),
                 "share_of_sites_in_conflict": 100 * opposed.mean(),
             }
         rows.append(row)

@@ -1,14 +1,12 @@
 """Time and memory: training from the runs' timing.csv, the rest from results/benchmark.csv, beside the paper's."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 
+from analysis import paths
 from analysis.tables.common import over_seeds, paper
 
 TITLE = "Runtime"
-BENCHMARK = Path("results/benchmark.csv")
 COLUMNS = {"quantity": "quantity", "unit": "unit", "seeds": "runs", "ours": "ours", "paper": "paper", "source": "from"}
 TRAINED = {  # our row -> experiment, script, the paper's row
     "EUPG, generalist": ("main", "eupg_var_lambda", "training_generalist_300k_steps"),
@@ -21,7 +19,7 @@ PHASES = ("rollout", "update", "evaluation")
 
 def hours(run) -> dict:
     """Hours of a run by phase; `training` is rollouts and updates."""
-    by_phase = run.timing.groupby("phase").seconds.sum().reindex([*PHASES, "environment"]) / 3600
+    by_phase = run.tables["timing"].set_index("phase").seconds.reindex([*PHASES, "environment"]) / 3600
     training = by_phase["rollout"] + by_phase["update"]
     return {
         "training": training,
@@ -61,8 +59,9 @@ def make(results) -> pd.DataFrame:
                     **row,
                 }
             )
-    if BENCHMARK.exists():
-        for row in pd.read_csv(BENCHMARK).itertuples():
+    benchmark = paths.results() / "benchmark.csv"
+    if benchmark.exists():
+        for row in pd.read_csv(benchmark).itertuples():
             rows.append(
                 {
                     "quantity": row.what,

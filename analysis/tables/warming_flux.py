@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from analysis.tables.common import mean_of_years, over_seeds, paper
+from analysis.tables.common import over_seeds, paper
 from analysis.tables.thaw_formulations import FORMULATIONS, replicates_of
 
 TITLE = "Warming flux by formulation"
@@ -21,11 +21,11 @@ def make(results) -> pd.DataFrame:
     """One row per formulation: means over 50 years, the episodes and the kept weights."""
     published = paper("thaw_formulations", index_col="formulation").warming_flux_mj
     zero_change = results.of("main", "zero_change")
-    reference = [mean_of_years(one, list(FLUXES))["boundary_warming_mj_m2"] for one in zero_change]
+    reference = [one.mean_of_years(FLUXES)["boundary_warming_mj_m2"] for one in zero_change]
     rows = []
     for formulation in FORMULATIONS:
         table = pd.DataFrame(
-            [mean_of_years(one, list(FLUXES)) for one in replicates_of(results, formulation)], columns=list(FLUXES)
+            [one.mean_of_years(FLUXES) for one in replicates_of(results, formulation)], columns=list(FLUXES)
         ).rename(columns=FLUXES)
         row = {"formulation": formulation, "seeds": len(table)} | over_seeds(table)
         row |= {"paper_warming": published[formulation], "zero_change_warming": reference[0] if reference else None}

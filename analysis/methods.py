@@ -1,0 +1,65 @@
+"""The methods that are compared, a row each. Experiments, tables, figures and documents take them from here."""
+
+from dataclasses import dataclass
+
+CONDITIONED = "conditioned on the preference"
+FIXED_WEIGHT = "trained for one weight"
+HEURISTIC = "fixed strategy of the paper"
+CONTROL = "fixed strategy of ours"
+
+
+@dataclass(frozen=True)
+class Method:
+    """A script, and how it is shown."""
+
+    script: str  # its file without .py
+    title: str
+    kind: str
+    colour: str
+    marker: str
+    paper: str | None = None  # its name in analysis/paper_tables; None: the paper does not have it
+
+    @property
+    def trains(self) -> bool:
+        """Whether it is trained."""
+        return self.kind in (CONDITIONED, FIXED_WEIGHT)
+
+    @property
+    def path(self) -> str:
+        """The script's file, relative to the repository."""
+        return f"{'cleanrl_style' if self.trains else 'baselines_heuristic'}/{self.script}.py"
+
+
+# Colours of Okabe and Ito (2008): told apart with every kind of colour vision; the markers tell them apart in grey.
+ROWS = (
+    Method("zero_change", "Zero change", HEURISTIC, "#000000", "x", "zero_density_change"),
+    Method("plus_100", "+100 a year", HEURISTIC, "#56B4E9", "+", "plus_100_density"),
+    Method("target_density", "Target density 1000", HEURISTIC, "#E69F00", "v", "target_density"),
+    Method("conifer_restoration", "Conifer restoration", HEURISTIC, "#0072B2", "*", "conifer_restoration"),
+    Method("random_valid", "Random", CONTROL, "#999999", "1"),
+    Method("eupg_var_lambda", "Variable λ EUPG", CONDITIONED, "#CC79A7", "s", "eupg_variable_lambda"),
+    Method("ppo_gated", "PPO Gated", CONDITIONED, "#009E73", "^", "ppo_gated"),
+    Method("ppo_curriculum", "Curriculum PPO", CONDITIONED, "#D55E00", "o", "curriculum_ppo"),
+    Method("eupg_fixed_lambda", "Fixed λ EUPG", FIXED_WEIGHT, "#0072B2", "D", "fixed_weight_eupg"),
+)
+METHODS = {method.script: method for method in ROWS}
+
+
+def scripts(*kinds: str) -> tuple[str, ...]:
+    """The scripts of these kinds, in order."""
+    return tuple(method.script for method in ROWS if method.kind in kinds)
+
+
+LEARNERS = scripts(CONDITIONED)
+TRAINED = scripts(CONDITIONED, FIXED_WEIGHT)
+STRATEGIES = scripts(HEURISTIC, CONTROL)
+
+
+def title(script: str) -> str:
+    """A script's title; of one that is not in the registry, such as one's own, its name."""
+    return METHODS[script].title if script in METHODS else script
+
+
+def paper_name(script: str) -> str | None:
+    """What the paper's tables call a script; None if they do not have it."""
+    return METHODS[script].paper if script in METHODS else None

@@ -1,0 +1,25 @@
+"""Where runs and results lie: below the folder in which a command is started."""
+
+from pathlib import Path
+
+QUICK = "quick"  # folder of what `reproduce.py --quick` makes, which are no results
+
+
+def runs(quick: bool = False) -> Path:
+    """Folder that holds the runs."""
+    return Path("runs", QUICK) if quick else Path("runs")
+
+
+def results(quick: bool = False) -> Path:
+    """Folder of all that is made of them."""
+    return Path("results", QUICK) if quick else Path("results")
+
+
+def archive(quick: bool = False) -> Path:
+    """Folder of the archived runs."""
+    return results(quick) / "runs"
+
+
+def studies(quick: bool = False) -> Path:
+    """Folder of the studies' tables."""
+    return results(quick) / "studies"

@@ -1,0 +1,56 @@
+"""Two tables for each environment that has other objectives than carbon and thaw, of the paper's main ones.
+
+main_results_<environment> has the metrics of every method there, detailed_objectives_<environment> the returns, and the
+gains over zero change, at each weight. The paper has neither.
+"""
+
+import pandas as pd
+
+from analysis.results import PAIR
+from analysis.tables import detailed_objectives, main_results
+from analysis.tables.common import ROW_COLUMNS
+
+RESPONSES = {"change": "{}, own weight lowest to highest", "slope": "slope of {} against own weight"}
+DETAILS = {"return": "{}", "sd_over_episodes": "sd over episodes, {}", "gain": "{} gain"}
+
+
+def columns_of(headings: dict[str, str], objectives) -> dict[str, str]:
+    """Columns of each kind for each objective; headings : kind -> text with the objective's place."""
+    return {f"{name}_{kind}": text.format(name) for kind, text in headings.items() for name in objectives}
+
+
+def main_table(rows: dict, objectives) -> tuple[pd.DataFrame, dict]:
+    """The metrics, a row a script and setting, and its columns."""
+    table = pd.DataFrame(
+        [
+            main_results.row_of_runs(key, [(one.evaluation, one.gains) for one in replicates], objectives)
+            for key, replicates in rows.items()
+        ]
+    )
+    shared = ("sd_over_episodes", *main_results.FRONT, *main_results.GAINS)
+    columns = {name: text for name, text in main_results.COLUMNS.items() if name in shared}
+    return table, ROW_COLUMNS | columns | columns_of(RESPONSES, objectives)
+
+
+def detailed_table(rows: dict, objectives) -> tuple[pd.DataFrame, dict]:
+    """The returns, a row a script, setting and weight, and its columns."""
+    found, weights = [], [f"weight_{name}" for name in objectives]
+    for key, replicates in rows.items():
+        ours = pd.concat([detailed_objectives.by_weight(one) for one in replicates])
+        for weight, at_weight in ours.groupby(level=weights):
+            found.append(detailed_objectives.row_at(key, dict(zip(weights, weight, strict=True)), at_weight))
+    columns = ROW_COLUMNS | {name: name.replace("_", " ") for name in weights} | columns_of(DETAILS, objectives)
+    return pd.DataFrame(found), columns
+
+
+def make(results) -> dict[str, tuple[pd.DataFrame, dict]]:
+    """File name -> table and columns."""
+    tables = {}
+    for env_id in dict.fromkeys(key[1] for key in results.rows):
+        rows = {key: one for key, one in results.rows.items() if key[1] == env_id and one}
+        objectives = results.objectives(env_id)
+        if objectives != PAIR:
+            name = env_id.split(":")[-1].replace("/", "-")
+            tables[f"main_results_{name}"] = main_table(rows, objectives)
+            tables[f"detailed_objectives_{name}"] = detailed_table(rows, objectives)
+    return tables
