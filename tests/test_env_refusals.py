@@ -52,7 +52,10 @@ BAD_ARGUMENTS = {
         {"constants": {"vpd_low_hpa": 20.0, "vpd_high_conifer_hpa": 5.0}},
         r"vpd_low_hpa = 20 .*vpd_high_conifer_hpa = 5",
     ),
-    "unknown group": ({"observation_groups": ("weather",)}, r"observation group 'weather': allowed are preference, state"),
+    "unknown group": (
+        {"observation_groups": ("weather",)},
+        r"observation group 'weather': allowed are preference, state",
+    ),
     "groups as text": ({"observation_groups": "state"}, r"observation_groups.*'state'"),
     "groups as number": ({"observation_groups": 5}, r"observation_groups.*5"),
     "no groups": ({"observation_groups": ()}, r"observation_groups"),
