@@ -103,7 +103,7 @@ def test_without_weights_a_lattice_is_evaluated(tmp_path):
     "arguments, message",
     [
         (("--eval-weights", 0, 1), "--eval-weights: 3 numbers a weight, not 2 in all"),
-        (("--eval-weights", 0.5, 0.5, 0.5), "--eval-weights: 3 numbers >= 0 that sum to 1 is allowed"),
+        (("--eval-weights", 0.5, 0.5, 0.5), "--eval-weights: a weight for each of 3 objectives"),
     ],
 )
 def test_weights_off_the_simplex_are_refused(arguments, message, tmp_path):
