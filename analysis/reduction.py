@@ -20,11 +20,12 @@ import pandas as pd
 
 from cleanrl_style.protocol import EPISODE_INFO, fronts
 from cleanrl_style.protocol.evaluation import EVALUATION_INFO
+from sim.demography import AGE_CLASSES
 
 PRIMARY = "sampled"  # the policy that tables and figures are about
 BINS = 40
 EVERY, FEWEST_ROUNDS = 8, 16  # of fewer rounds all are kept
-SPECIES, AGE_CLASSES = ("conifer", "deciduous"), ("seedling", "sapling", "young", "mature", "old")
+SPECIES = ("conifer", "deciduous")
 SPREAD = ("density_stems_ha", "conifer_fraction")
 ANNUAL = (
     *SPREAD,
