@@ -57,7 +57,7 @@ def test_drawn_episodes_are_of_both_kinds():
 
 def test_a_study_is_made_once(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(constant_plans, "PLANTING", (24,))
-    monkeypatch.setattr(constant_plans.results, "QUICK_STUDIES_DIR", tmp_path)
+    monkeypatch.setattr(constant_plans.paths, "studies", lambda quick: tmp_path)
     monkeypatch.setattr(constant_plans.open_loop, "fingerprint", lambda: "physics")
     constant_plans.main(constant_plans.Args(quick=True))
     table = stored.read(tmp_path / "constant_plans.csv")
