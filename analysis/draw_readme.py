@@ -6,20 +6,20 @@ The stand is planted for twelve years and then left alone. The animation is of c
 policy of a run, which plays the same site and weather.
 """
 
-import importlib
 import json
 from collections.abc import Callable
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
-import torch
 import tyro
 from PIL import Image
 
 import boreal_env
+from analysis.experiments import GENERALIST
 from baselines_heuristic import conifer_restoration
 from cleanrl_style import protocol
+from cleanrl_style.protocol.evaluation import choose_actions
 
 SEED, YEARS, PLANTING_YEARS = 11, 35, 12
 PLANT_100_HALF_CONIFER = 22
@@ -32,7 +32,7 @@ Policy = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 def stand() -> Image.Image:
     """A stand 35 years after the first trees were planted."""
-    env = gym.make("boreal-generalist-v0", render_mode="rgb_array")
+    env = gym.make(GENERALIST, render_mode="rgb_array")
     env.reset(seed=SEED, options={"preference": 0.5})
     for year in range(YEARS):
         env.step(PLANT_100_HALF_CONIFER if year < PLANTING_YEARS else boreal_env.NO_CHANGE)
@@ -54,24 +54,18 @@ def frames(policy: Policy, env_id: str, preference: float) -> list[Image.Image]:
 
 
 def trained_policy(run_dir: Path) -> tuple[Policy, str]:
-    """The sampled policy of a run's checkpoint, and the id of its environment."""
-    if not (run_dir / "checkpoint.pt").exists():
-        protocol.fail(f"--run-dir {run_dir}: it has no checkpoint.pt")
+    """The sampled policy of a run, and the id of its environment."""
+    try:
+        probabilities = protocol.load_agent(run_dir)
+    except FileNotFoundError as error:
+        protocol.fail(f"--run-dir {run_dir}: {error}")
     config = json.loads((run_dir / "config.json").read_text(encoding="utf-8"))
-    env_id = config["arguments"]["env_id"]
-    critic = {"num_values": 2} if config["arguments"].get("per_objective_advantages") else {}
-    agent_class = importlib.import_module(f"cleanrl_style.{config['script']}").Agent
-    agent = agent_class(gym.make_vec(env_id, num_envs=1), **critic)
-    agent.load_state_dict(torch.load(run_dir / "checkpoint.pt", weights_only=False)["agent"])
-    torch.manual_seed(SEED)
+    generator = np.random.default_rng(SEED)
 
     def policy(observations, masks, accrued_returns):
-        if config["script"].startswith("eupg"):
-            observations = np.concatenate([observations, accrued_returns / boreal_env.DEFAULT_YEARS], axis=1)
-        with torch.no_grad():
-            return agent.get_action_and_value(torch.from_numpy(observations), torch.from_numpy(masks))[0].numpy()
+        return choose_actions(probabilities(observations, masks, accrued_returns), generator.random(len(masks)))
 
-    return policy, env_id
+    return policy, config["arguments"]["env_id"]
 
 
 def save_animation(path: Path, pictures: list[Image.Image]) -> None:
@@ -86,7 +80,7 @@ def main(run_dir: Path | None = None, preference: float = 0.5, images: Path = Pa
     """Draw stand.png and conifer_restoration.gif; with a run, its policy as trained_policy.gif instead.
 
     Args:
-        run_dir: folder of a training run, whose checkpoint.pt is played
+        run_dir: folder of a training run, whose agent is played
         preference: weight of carbon in the animation
         images: folder of the pictures
     """
@@ -97,7 +91,7 @@ def main(run_dir: Path | None = None, preference: float = 0.5, images: Path = Pa
         def heuristic(observations, masks, accrued_returns):
             return conifer_restoration.policy(observations, masks)
 
-        pictures = frames(heuristic, "boreal-generalist-v0", preference)
+        pictures = frames(heuristic, GENERALIST, preference)
         save_animation(images / "conifer_restoration.gif", pictures)
     else:
         save_animation(images / "trained_policy.gif", frames(*trained_policy(run_dir), preference))

@@ -11,7 +11,7 @@ def test_a_plan_is_carried_out_where_it_is_valid(monkeypatch):
     observations = np.ones((2, 105), dtype=np.float32)
     chosen = []
 
-    def evaluate(args, env_kwargs, policy, weights, policies):
+    def evaluate(task, policy, weights, episodes, policies):
         chosen.append(policy(observations, masks, None).argmax(axis=1).tolist())
         return pd.DataFrame(columns=["episode", "seed", "carbon_return", "thaw_return"]), None
 

@@ -1,11 +1,8 @@
-import importlib
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
-import torch
 from tiny_runs import write_run
 
 import boreal_env
@@ -55,7 +52,7 @@ def fronts_dir(tmp_path, monkeypatch):
         stored.write(tmp_path / "fronts" / f"{site}-all-on.csv", HAND, {"physics": "here", "case": [site, "all on"]})
     monkeypatch.setattr(distance_to_best, "FRONTS_DIR", tmp_path / "fronts")
     monkeypatch.setattr(distance_to_best.open_loop, "fingerprint", lambda: "here")
-    monkeypatch.setattr(distance_to_best.results, "STUDIES_DIR", tmp_path / "studies")
+    monkeypatch.setattr(distance_to_best.paths, "studies", lambda quick: tmp_path / "studies")
     return tmp_path / "fronts"
 
 
@@ -63,7 +60,7 @@ def fronts_dir(tmp_path, monkeypatch):
 
 
 def test_gains_and_the_best_of_a_hand_case():
-    plans = distance_to_best.with_gains(HAND)
+    plans = open_loop.with_gains(HAND)
     zero = plans[plans.actions == "12 12"]
     assert (zero[GAINS] == 0).all(axis=None)
     gains = distance_to_best.gains_of(plans)
@@ -78,7 +75,7 @@ def test_gains_and_the_best_of_a_hand_case():
 
 def test_the_best_constant_plans():
     other = plans_of({("constant", "12 12"): (0, 0), ("constant", "24 24"): (1, -4), ("constant", "20 20"): (1.5, 1)})
-    plans = {1: distance_to_best.with_gains(HAND), 2: distance_to_best.with_gains(other)}
+    plans = {1: open_loop.with_gains(HAND), 2: open_loop.with_gains(other)}
     table = distance_to_best.constant_plans(plans, (0.0, 1.0)).set_index(["method", "weight", "site"]).sort_index()
     # thaw gains of 24 are 2 and -4, of 20 -1 and 1; carbon gains of 24 are 1 and 1, of 20 2 and 1.5
     of_site, of_all = (table.loc[method, "scalarized_gain"] for method in (BEST_OF_SITE, BEST_OF_ALL))
@@ -88,7 +85,7 @@ def test_the_best_constant_plans():
 
 
 def test_where_nothing_can_be_gained_there_is_no_share():
-    flat = distance_to_best.with_gains(plans_of({("constant", "12 12"): (0, 0), ("front", "24 12"): (1, 0)}))
+    flat = open_loop.with_gains(plans_of({("constant", "12 12"): (0, 0), ("front", "24 12"): (1, 0)}))
     row = dict.fromkeys(distance_to_best.KEY, "") | {
         "site": 7,
         "carbon_gain": 0.5,
@@ -128,7 +125,7 @@ def test_a_strategy_plays_once_for_all_weights(monkeypatch):
             super().__init__(cases, years=2, **kwargs)
 
     monkeypatch.setattr(distance_to_best, "OnSites", Short)
-    plans = {site: distance_to_best.with_gains(HAND) for site in SITES}
+    plans = {site: open_loop.with_gains(HAND) for site in SITES}
     done = []
     table = distance_to_best.judge(distance_to_best.strategy("zero_change"), {}, plans, (0.0, 1.0), False, done.append)
     assert sum(done) == 4 and len(table) == 4 and set(table.policy) == {"sampled"}
@@ -140,33 +137,12 @@ def test_a_strategy_plays_once_for_all_weights(monkeypatch):
     np.testing.assert_allclose(of_site.scalarized_gain, returns.mean(axis=0)[::-1], atol=2e-6)
 
 
-@pytest.mark.parametrize(
-    "script, arguments",
-    [
-        ("ppo_gated", {}),
-        ("ppo_gated", {"per_objective_advantages": True, "hide_site": True}),
-        ("ppo_curriculum", {}),
-        ("eupg_var_lambda", {}),
-        ("eupg_fixed_lambda", {}),
-    ],
-)
-def test_an_agent_is_its_scripts_own(script, arguments, tmp_path):
-    module = importlib.import_module(f"cleanrl_style.{script}")
-    size = 43 if "hide_site" in arguments else 105
-    spaces = SimpleNamespace(single_observation_space=SimpleNamespace(shape=(size,)))
-    agent = module.Agent(spaces, 2) if arguments else module.Agent(spaces)
-    torch.save({"agent": agent.state_dict()}, tmp_path / "checkpoint.pt")
-    policy, kwargs = distance_to_best.agent_policy(tmp_path, {"script": script, "arguments": arguments})
-    envs = distance_to_best.OnSites([(SITES[0], 4)], **kwargs)
-    observations, _ = envs.reset(seed=0, options={"preference": 0.5})
-    masks, accrued = envs.action_masks(), np.array([[1.0, -2.0]])
-    x = torch.from_numpy(observations)
-    if script.startswith("eupg"):
-        x = module.policy_input(observations, accrued)
-        assert x[0, -2:].tolist() == pytest.approx([1 / 50, -2 / 50])
-    with torch.no_grad():
-        expected = agent.get_distribution(x, torch.from_numpy(masks)).probs.numpy()
-    np.testing.assert_array_equal(policy(observations, masks, accrued), expected)
+def test_an_agent_plays_what_it_was_trained_to_observe(tmp_path, monkeypatch):
+    monkeypatch.setattr(distance_to_best.protocol, "load_agent", lambda folder: folder)
+    for arguments, size in (({}, 105), ({"hide_site": True}, 43)):
+        policy, kwargs = distance_to_best.agent_policy(tmp_path, {"script": "ppo_gated", "arguments": arguments})
+        envs = distance_to_best.OnSites([(SITES[0], 4)], **kwargs)
+        assert policy == tmp_path and envs.reset(seed=0, options={"preference": 0.5})[0].shape == (1, size)
 
 
 # -------------------------------------------------------------------------------------------- the table
@@ -196,7 +172,7 @@ def calls(monkeypatch):
 
 def add_run(folder, *arguments, **named):
     write_run(folder, *arguments, **named)
-    (folder / "checkpoint.pt").touch()
+    (folder / "policy.pt").touch()
 
 
 def evaluate(runs, calls, **arguments):
@@ -208,10 +184,10 @@ def evaluate(runs, calls, **arguments):
 def test_only_what_the_table_lacks_is_evaluated(fronts_dir, calls, tmp_path):
     runs, path = tmp_path / "runs", tmp_path / "studies" / "distance_to_best.csv"
     add_run(runs / "b", "ppo_gated", seed=2)
-    write_run(runs / "no checkpoint", "ppo_gated", seed=3)
+    write_run(runs / "no agent", "ppo_gated", seed=3)
     add_run(runs / "elsewhere", "ppo_unknown")
     (runs / "damaged").mkdir()
-    for name in ("config.json", "evaluation.csv", "checkpoint.pt"):
+    for name in ("config.json", "evaluation.csv", "policy.pt"):
         (runs / "damaged" / name).touch()
     assert evaluate(runs, calls) == ["zero_change", "b"]
     first = path.read_bytes()

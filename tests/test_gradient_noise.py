@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 import torch
 
+from analysis import metrics
 from analysis.studies import gradient_noise
 from analysis.studies.gradient_noise import MEAN, NONE, SITE
 from cleanrl_style import eupg_var_lambda as eupg
@@ -45,7 +46,7 @@ def test_without_a_baseline_it_is_the_scripts_gradient(played):
             preference = episodes.preferences[which]
             mean = mean + (preference * carbon + (1 - preference) * thaw) / 4
         by_year = [np.moveaxis(column.reshape(4, *column.shape[2:]), 1, 0) for column in episodes[:4]]
-        utilities = eupg.compute_utilities(by_year[3], episodes.preferences.ravel(), 1.0, utility)
+        utilities = eupg.compute_utilities(by_year[3], metrics.pair(episodes.preferences.ravel()), 1.0, utility)
         flat = [torch.from_numpy(column.reshape(-1, *column.shape[2:]).copy()) for column in by_year[:3]]
         agent.zero_grad()
         loss, _ = eupg.eupg_loss(agent, *flat, torch.from_numpy(utilities.ravel().astype(np.float32)))

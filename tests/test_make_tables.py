@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from tiny_runs import TINY_RUNS, write_run
+from tiny_runs import TINY_RUNS, write_run, write_run_of_three
 
 import boreal_env
-from analysis import experiments, make_tables, results
+from analysis import archive, experiments, make_tables, paths
 from analysis.results import Results
 from analysis.studies import stored
 from analysis.studies.signal_to_noise import CONTRASTS
@@ -27,7 +27,8 @@ MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")
 def no_studies(tmp_path_factory):
     """The project's own studies are not the tests'."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(results, "STUDIES_DIR", tmp_path_factory.mktemp("no studies"))
+        nothing = tmp_path_factory.mktemp("no studies")
+        patch.setattr(paths, "studies", lambda quick: nothing)
         yield
 
 
@@ -287,6 +288,38 @@ def test_a_policy_without_preference_has_neither_sparsity_nor_response(tables):
     row = read(tables, "main_results", ["method", "environment", "setting"]).loc[key]
     assert np.isnan(row.sparsity) and np.isnan(row.carbon_change)
     assert row.hypervolume == pytest.approx(1 * 3) and row.gain_hypervolume == pytest.approx(4)
+
+
+def test_three_objectives_have_tables_of_their_own(tables, tmp_path):
+    runs = tmp_path / "runs"
+    shutil.copytree(TINY_RUNS / "curriculum", runs / "curriculum")
+    shutil.copytree(TINY_RUNS / "zero_change", runs / "zero_change")
+    write_run_of_three(runs / "zero", "zero_change", np.zeros((3, 3)))
+    for seed in (1, 2):
+        write_run_of_three(runs / f"ours {seed}", "ppo_gated", seed * np.eye(3), seed)
+    archive.archive(runs, tmp_path / "archive")
+    for name, folder in (("tables", runs), ("of archive", tmp_path / "archive")):
+        make(folder, tmp_path / name)
+    written = {path.name for path in (tmp_path / "tables").iterdir()} - {path.name for path in tables.iterdir()}
+    stems = ("main_results_timber-v0", "detailed_objectives_timber-v0")
+    assert written == {f"{stem}.{end}" for stem in stems for end in ("csv", "md", "tex")}
+    for path in (tmp_path / "tables").iterdir():
+        assert path.read_bytes() == (tmp_path / "of archive" / path.name).read_bytes()
+        if path.name not in written:  # what is known of two objectives stays as it is
+            assert path.read_bytes() == (tables / path.name).read_bytes()
+
+    main = read(tmp_path / "tables", stems[0], "method")
+    assert main.loc["ppo_gated", ["seeds", "cardinality"]].tolist() == [2, 3]
+    # corners of 1 and of 2, from -2: 3 boxes of 2 x 2 x (2 + k) that share one of 2 x 2 x 2
+    assert main.hypervolume["ppo_gated"] == pytest.approx(np.mean([8 + 3 * 4 * k for k in (1, 2)]))
+    assert main.gain_scalarized["ppo_gated"] == main.scalarized["ppo_gated"] == pytest.approx(1.5)
+    assert main.timber_change["ppo_gated"] == pytest.approx(1.5) and np.isnan(main.timber_change["zero_change"])
+    details = read(tmp_path / "tables", stems[1], ["method", "weight_carbon", "weight_thaw", "weight_timber"])
+    row = details.loc[("ppo_gated", 0, 0, 1)]
+    assert row[["carbon_return", "thaw_return", "timber_return", "timber_gain"]].tolist() == pytest.approx(
+        [0, 0, 1.5, 1.5]
+    )
+    assert len(details) == 6
 
 
 # ------------------------------------------------------------------------------ tables of studies

@@ -4,7 +4,7 @@ import pytest
 from scripts import run_script
 
 from analysis.studies import constant_plans, mechanism_pairs, site_warming, stored
-from cleanrl_style.protocol.evaluation import EVAL_WEIGHTS
+from cleanrl_style.protocol.fronts import evaluation_weights
 
 
 def test_a_pair_differs_in_its_one_thing(monkeypatch):
@@ -37,13 +37,13 @@ def test_constant_plans_as_an_evaluation():
             "thaw_return": [-3.0, -1.0, 0.0, 2.0],
         }
     )
-    best = constant_plans.as_evaluation(plans, EVAL_WEIGHTS, best=True)
+    best = constant_plans.as_evaluation(plans, evaluation_weights(2), best=True)
     # conifers 3 w - 2 (1 - w), deciduous w + (1 - w): equal at w = 0.6
     chosen = best.groupby("preference").action.first()
     assert (chosen[chosen.index < 0.55] == 20).all() and (chosen[chosen.index > 0.65] == 24).all()
     assert best[best.preference == 1].scalarized_return.tolist() == [2, 4]
-    dense = constant_plans.as_evaluation(plans, EVAL_WEIGHTS, best=False)
-    assert (dense.action == 24).all() and len(dense) == 2 * len(EVAL_WEIGHTS)
+    dense = constant_plans.as_evaluation(plans, evaluation_weights(2), best=False)
+    assert (dense.action == 24).all() and len(dense) == 2 * len(evaluation_weights(2))
 
 
 def test_drawn_episodes_are_of_both_kinds():
@@ -57,7 +57,7 @@ def test_drawn_episodes_are_of_both_kinds():
 
 def test_a_study_is_made_once(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(constant_plans, "PLANTING", (24,))
-    monkeypatch.setattr(constant_plans.results, "QUICK_STUDIES_DIR", tmp_path)
+    monkeypatch.setattr(constant_plans.paths, "studies", lambda quick: tmp_path)
     monkeypatch.setattr(constant_plans.open_loop, "fingerprint", lambda: "physics")
     constant_plans.main(constant_plans.Args(quick=True))
     table = stored.read(tmp_path / "constant_plans.csv")

@@ -36,6 +36,49 @@ def test_golden_front():
     assert metrics.cardinality(FRONT) == 3
 
 
+def test_three_objectives():
+    cube = np.eye(3)
+    # above -1 of each, three boxes of 2 x 1 x 1, any two of which share the same 1 x 1 x 1
+    assert metrics.hypervolume(cube, reference=-1.0) == pytest.approx(3 * 2 - 3 * 1 + 1)
+    assert metrics.hypervolume([(1, 2, 3), (1, 1, 1)], reference=(0, 0, 0)) == pytest.approx(6)
+    assert metrics.hypervolume([(0, 0, 0)]) == pytest.approx(8)  # above -2 of each
+    assert metrics.sparsity(cube) == pytest.approx(3 * 1 / 2)
+    assert metrics.cardinality(np.vstack([cube, [(0, 0, 0)]])) == 3
+    # the best of the corners is the largest weight: its mean over the weights that are multiples of a ninth
+    lattice = [(i, j, 9 - i - j) for i in range(10) for j in range(10 - i)]
+    assert len(lattice) == 55
+    assert metrics.expected_utility(cube) == pytest.approx(np.mean([max(weights) / 9 for weights in lattice]))
+    assert metrics.expected_utility([(2, 2, 2)]) == pytest.approx(2)
+
+
+def three_objectives():
+    """Two episodes at four weights; each return is its own weight, and a tenth of the episode's number more."""
+    weights = np.array([(0, 0, 1), (0, 1, 0), (1, 0, 0), (0.5, 0.25, 0.25)])
+    rows = []
+    for seed, one in itertools.product((0, 1), weights):
+        names = ("carbon", "thaw", "timber")
+        returns = one + 0.1 * seed
+        row = {f"weight_{name}": weight for name, weight in zip(names, one, strict=True)}
+        row |= {"seed": seed} | {f"{name}_return": value for name, value in zip(names, returns, strict=True)}
+        rows.append(row | {"scalarized_return": one @ returns, "asymmetric_thaw_return": 99.0})
+    return pd.DataFrame(rows)
+
+
+def test_an_evaluation_of_three_objectives():
+    table = three_objectives()
+    front = metrics.mean_returns(table)
+    assert front.columns.tolist() == ["carbon_return", "thaw_return", "timber_return"]
+    assert front.loc[(0, 1, 0)].tolist() == pytest.approx([0.05, 1.05, 0.05])
+    assert metrics.mean_scalarized(table) == pytest.approx((3 + 0.375) / 4 + 0.05)
+    gained = metrics.gains(table, table[table.weight_timber == 1])
+    assert gained.loc[2, ["carbon_return", "thaw_return", "timber_return"]].tolist() == pytest.approx([1, 0, -1])
+    assert gained.scalarized_return[2] == pytest.approx(1)
+    response = metrics.preference_response(table)
+    # from the mean of the weights without it, 0.05, to its own corner, 1.05
+    assert response.change.tolist() == pytest.approx([1, 1, 1]) and response.slope.tolist() == pytest.approx([1, 1, 1])
+    assert response.change_low.tolist() == pytest.approx([1, 1, 1])
+
+
 def test_dominated_points_and_duplicates_change_nothing():
     more = np.vstack([FRONT, [(0, 0), (1, 2)]])
     assert metrics.sparsity(more) == metrics.sparsity(FRONT)

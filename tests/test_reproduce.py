@@ -69,10 +69,10 @@ def test_a_variant_knows_its_run():
     job = next(job for job in experiments.jobs(["variants"]) if "reward_scales" in job.flags)
     assert job.command == ("python cleanrl_style/ppo_gated.py --seed 1 --vectorization lockstep --reward-scales 1.43 1")
     args = Args(vectorization="lockstep", reward_scales=(1.43, 1.0))
-    protocol.resolve(args)
+    protocol.make_task(args)
     config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}
     config = json.loads(json.dumps(config))
-    assert job.made(config) and job.row[2] == runs.setting(config["not_default"], args.env_id)
+    assert job.made(config) and job.row[2] == runs.setting(config["not_default"], args.mode)
     balanced = boreal_env.Reward().carbon_scale / boreal_env.BALANCED_CARBON_SCALE
     assert experiments.REWARD_SCALES == (pytest.approx(balanced, abs=0.005), 1.0)
 
@@ -80,13 +80,13 @@ def test_a_variant_knows_its_run():
 def test_agents_of_one_site_are_a_row_of_their_own():
     job = next(job for job in experiments.jobs(["single"], [2]) if job.trains)
     args = Args(**job.flags)
-    protocol.resolve(args)
+    protocol.make_task(args)
     config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}
     config = json.loads(json.dumps(config))
     assert job.made(config) and args.site_seed == experiments.FRONT_SITES[1] and args.mode == "generalist"
-    assert runs.setting(config["not_default"], args.env_id) == job.row[2] and "site_seed=one" in job.row[2]
-    in_one_world = runs.setting({"site_seed": 3}, "boreal-site-specific-v0")
-    assert (in_one_world, runs.setting({"site_seed": 3}, "boreal-generalist-v0")) == ("default", "site_seed=one")
+    assert runs.setting(config["not_default"], args.mode) == job.row[2] and "site_seed=one" in job.row[2]
+    in_one_world = runs.setting({"site_seed": 3}, runs.SITE_SPECIFIC)
+    assert (in_one_world, runs.setting({"site_seed": 3}, "generalist")) == ("default", "site_seed=one")
 
 
 def test_every_row_has_its_first_job():

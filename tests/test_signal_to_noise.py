@@ -114,7 +114,7 @@ def test_the_same_bytes_again(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(signal_to_noise.open_loop, "fingerprint", lambda: "physics")
     names = ("signal_to_noise.csv", "signal_to_noise_years.csv")
     for folder in ("first", "second"):
-        monkeypatch.setattr(signal_to_noise.results, "QUICK_STUDIES_DIR", tmp_path / folder)
+        monkeypatch.setattr(signal_to_noise.paths, "studies", lambda quick, folder=folder: tmp_path / folder)
         signal_to_noise.main(signal_to_noise.Args(quick=True))
     for name in names:
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()

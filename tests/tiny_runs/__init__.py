@@ -2,11 +2,15 @@
 
 import json
 import shutil
+from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from cleanrl_style.protocol.evaluation import EVALUATION_COLUMNS
+from cleanrl_style.protocol import EPISODE_INFO
+from cleanrl_style.protocol.evaluation import evaluation_columns
+from cleanrl_style.protocol.fronts import return_columns, weight_columns
 
 TINY_RUNS = Path(__file__).parent
 
@@ -41,7 +45,7 @@ def write_run(
                         "ground_shortwave_mj_m2": 1500 + site,
                     }
                 )
-    episodes = pd.DataFrame(rows, columns=EVALUATION_COLUMNS)
+    episodes = pd.DataFrame(rows, columns=evaluation_columns(("carbon", "thaw")))
     w = episodes.preference
     episodes["scalarized_return"] = w * episodes.carbon_return + (1 - w) * episodes.thaw_return
     folder.mkdir(parents=True)
@@ -63,4 +67,41 @@ def write_run(
         **not_default,
     }
     config = {"script": script, "arguments": arguments, "not_default": not_default}
+    (folder / "config.json").write_text(json.dumps(config))
+
+
+def write_run_of_three(folder, script, returns, seed=1, env_id="timber_env:timber-v0"):
+    """A finished run of carbon, thaw and timber, evaluated at their corners; returns : a row a corner."""
+    objectives, corners = ("carbon", "thaw", "timber"), np.eye(3)
+    trains = script.startswith(("ppo", "eupg"))
+    parts = {"evaluation": [], "episodes": [], "evaluation_years": []}
+    for weights, mean in zip(corners, np.asarray(returns, dtype=float), strict=True):
+        its_weights = dict(zip(weight_columns(objectives), weights, strict=True))
+        for episode, shift in enumerate((-1.0, 1.0)):
+            scores = dict(zip(return_columns(objectives), mean + shift, strict=True))
+            scores["scalarized_return"] = weights @ (mean + shift)
+            one = {**its_weights, "episode": episode, "seed": episode, "site_seed": episode, **scores}
+            parts["evaluation"] += [{"policy": policy, **one} for policy in ("greedy", "sampled")]
+            stand = dict.fromkeys(EPISODE_INFO, 0.5)
+            parts["episodes"].append({"global_step": 100 * (episode + 1), "env": 0, **its_weights, **scores, **stand})
+        for policy, year in product(("greedy", "sampled"), (1, 2)):
+            statistics = dict.fromkeys(("mean", "sd", "p10", "p50", "p90"), 500.0)
+            row = {"policy": policy, **its_weights, "year": year, "variable": "density_stems_ha", **statistics}
+            parts["evaluation_years"].append(row)
+    folder.mkdir(parents=True)
+    for name, rows in parts.items():
+        if trains or name != "episodes":
+            pd.DataFrame(rows).to_csv(folder / f"{name}.csv", index=False)
+    shutil.copy(TINY_RUNS / "curriculum" / "timing.csv", folder)
+    arguments = {
+        "seed": seed,
+        "env_id": env_id,
+        "thaw_formulation": "asymmetric",
+        "site_seed": None,
+        "mode": "generalist",
+        "eval_weights": corners.tolist(),
+        "eval_episodes": 2,
+        **({"total_timesteps": 200} if trains else {}),
+    }
+    config = {"script": script, "arguments": arguments, "not_default": {}}
     (folder / "config.json").write_text(json.dumps(config))
