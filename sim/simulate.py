@@ -8,7 +8,7 @@ from sim.management import check_actions
 from sim.parameters import middle_site
 from sim.spin_up import check_initial
 from sim.stands import Stands
-from sim.state import DAILY, DAYS, FORCING, RECORD_NAMES
+from sim.state import DAILY_NAMES, DAYS, FORCING, RECORD_NAMES
 
 #: Allowed values of an observed forcing: column -> (low, high, unit, hint).
 FORCING_LIMITS = {
@@ -92,7 +92,7 @@ def simulate(
         if output == "annual":
             table = pd.DataFrame(record, columns=RECORD_NAMES)
         else:
-            table = pd.DataFrame(daily[0], columns=DAILY)
+            table = pd.DataFrame(daily[0], columns=DAILY_NAMES)
             table.insert(0, "doy", np.arange(1, days + 1))
         table.insert(0, "year", year)
         tables.append(table)

@@ -189,6 +189,7 @@ wood_rate
 PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS)
 STATE_NAMES = tuple(STATE)
 RECORD_NAMES = tuple(RECORD)
+DAILY_NAMES = tuple(DAILY)
 STATE_SIZE = len(STATE) + 2 * AGES
 DRAWS_SIZE = sum(DAYS if daily else 1 for daily, *_ in DRAWS.values())
 

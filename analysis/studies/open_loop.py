@@ -11,7 +11,7 @@ import numpy as np
 
 import boreal_env
 import sim
-from sim.weather import FREEZING_POINT_K
+from sim.physical_constants import FREEZING_POINT_K
 
 # Beyond what an environment draws (below 2^31), and not met in training, evaluation or the measured balance.
 FIRST_SITE_SEED = 3_000_000_000

@@ -9,11 +9,8 @@ import pandas as pd
 from analysis.validation import disaggregation, poker_flat, towers
 from sim.jit import uncompiled
 from sim.parameters import CONSTANTS
+from sim.physical_constants import FREEZING_POINT_K, PSYCHROMETRIC_PER_HPA, SOLAR_CONSTANT, STEFAN_BOLTZMANN
 from sim.weather import (
-    FREEZING_POINT_K,
-    PSYCHROMETRIC_PER_HPA,
-    SOLAR_CONSTANT,
-    STEFAN_BOLTZMANN,
     saturation_pressure,
     saturation_slope,
     sky_emissivity,
