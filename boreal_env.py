@@ -111,7 +111,8 @@ def _observation_table() -> tuple[Observed, ...]:
         Observed("soil_limit_penalty", "penalties", "1", 0, 0.5, 0, 100),
         Observed("density_penalty", "penalties", "1", 0, 1.0, 0, 100),
     ]
-    for name, p in sim.SITE_PARAMETERS.items():
+    for name in sim.OBSERVED_SITE_PARAMETERS:
+        p = sim.SITE_PARAMETERS[name]
         table.append(Observed(f"site_{name}", "site", p.unit, -p.low, p.high - p.low, p.physical_low, p.physical_high))
     return tuple(table)
 
@@ -123,7 +124,7 @@ _SHIFT = np.array([entry.shift for entry in OBSERVATION])
 _SCALE = np.array([entry.scale for entry in OBSERVATION])
 _AGE = slice(OBSERVATION_NAMES.index("conifer_seedling"), OBSERVATION_NAMES.index("deciduous_old") + 1)
 _PENALTIES = slice(OBSERVATION_NAMES.index("biomass_limit_penalty"), OBSERVATION_NAMES.index("density_penalty") + 1)
-_SITE = slice(OBSERVATION_NAMES.index(f"site_{next(iter(sim.SITE_PARAMETERS))}"), len(OBSERVATION))
+_SITE = slice(OBSERVATION_NAMES.index(f"site_{sim.OBSERVED_SITE_PARAMETERS[0]}"), len(OBSERVATION))
 _CLIMATE = ("latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c", "growth_start_day", "fall_start_day")
 _COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
 

@@ -42,7 +42,7 @@ def simulate(
     Parameters
     ----------
     site : dict of site parameters that differ from the middle of their ranges (any value inside the physical
-        limits of `sim/site_parameters.csv`), or None. All 62, as `sim.sample_site` returns them, are a site too.
+        limits of `sim/site_parameters.csv`), or None. All of them, as `sim.sample_site` returns them, are a site too.
     actions : integer in [0, 25) for every year, or a sequence with one a year; 12 changes nothing.
     seed : of first state, weather and disturbances.
     years : years to run.

@@ -94,7 +94,7 @@ class Stands:
     def start(self, stands, sites, seeds, initial=None, initial_ranges=None, observed=None) -> None:
         """Put stands at the beginning of an episode: draw their first state and spin it up.
 
-        stands : indices; sites : for each, its 62 parameters by name; seeds : for each, its `Seeds`;
+        stands : indices; sites : for each, its parameters by name; seeds : for each, its `Seeds`;
         initial : position in `stands` -> dict of first stocks by record name; initial_ranges : ranges that the first
         stocks are drawn from, name -> (low, high), instead of `sim.spin_up.INITIAL_RANGES`; observed : a year's
         forcing to spin up with, instead of generated weather (a part of a year is not used).

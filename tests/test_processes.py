@@ -480,13 +480,8 @@ def test_aerodynamic_conductance():
 
 
 def test_stress_ramp():
-    assert [photosynthesis.stress_ramp(v, -8.0, 1.0 / 16.0) for v in (-20.0, -8.0, 0.0, 8.0, 20.0)] == [
-        0.0,
-        0.0,
-        0.5,
-        1.0,
-        1.0,
-    ]
+    stress = [photosynthesis.stress_ramp(v, -8.0, 1.0 / 16.0) for v in (-20.0, -8.0, 0.0, 8.0, 20.0)]
+    assert stress == [0.0, 0.0, 0.5, 1.0, 1.0]
 
 
 @pytest.mark.parametrize("melt_span", [0.0, 2.0, 1e3], ids=["no snow", "melts out", "deep snow"])
