@@ -1,8 +1,8 @@
 """The two parameter tables, sampling of sites, and the checks of user-given values.
 
 `site_parameters.csv`: the parameters that differ between sites, with the range they are sampled from, and whether an
-observation of the site shows them. `constants.csv`: literature constants, one value each. Both have physical limits, a unit and a source, and both
-are passed to the compiled physics at run time: changing one recompiles nothing.
+observation of the site shows them. `constants.csv`: literature constants, one value each. Both have physical limits, a
+unit and a source, and both are passed to the compiled physics at run time: changing one recompiles nothing.
 """
 
 import csv

@@ -1,6 +1,9 @@
 """Process functions against values from the literature, limits, and cases worked out by hand."""
 
+import importlib
 import math
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -813,3 +816,13 @@ def test_decoding_of_actions():
     change, mix = management.decode(np.arange(25))
     assert change.tolist() == [c for c in (-100.0, -50.0, 0.0, 50.0, 100.0) for _ in range(5)]
     assert mix.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0] * 5
+
+
+# ---------------------------------------------------------------------------------------------------- the document
+
+
+def test_the_document_names_functions_that_exist():
+    text = (Path(__file__).parents[1] / "docs" / "model.md").read_text()
+    names = set(re.findall(r"`sim\.(\w+)\.(\w+)", text))
+    assert len(names) > 50
+    assert [name for name in names if not hasattr(importlib.import_module(f"sim.{name[0]}"), name[1])] == []
