@@ -23,7 +23,7 @@ from analysis.benchmark import per_step, started
 from analysis.machine import machine
 from cleanrl_style import protocol
 from sim.account import clear_day, end_day
-from sim.block import LANES
+from sim.block import LANES, filled_block
 from sim.canopy import solve_canopy
 from sim.day import begin_day
 from sim.draws import draw_year
@@ -31,7 +31,7 @@ from sim.forcing import hour_angles, step_weather
 from sim.jit import OPTIONS
 from sim.physical_constants import SECONDS_PER_DAY
 from sim.response import answer_to_canopy
-from sim.state import DRAWS_SIZE, STATE_SIZE, block_dtype, daily_dtype
+from sim.state import daily_dtype
 from sim.step import simulate_step
 from sim.year import begin_year
 
@@ -43,6 +43,7 @@ MOMENTS = {  # name -> (day, step of the day)
     "summer night": (190, 2),
     "summer noon": (190, 24),
 }
+NO_CHANGE = 12  # the action that leaves a stand alone
 COPIES = 4  # of the block, taken in turn, so that the compiler cannot do once what is to be done every time
 CALLS = 400
 DAYS = (begin_day, clear_day, end_day)  # once a day
@@ -110,12 +111,15 @@ def blocks_at(moments: dict, lanes: int) -> dict[str, tuple]:
     stands = started(lanes, threads=1)
     generator = np.random.default_rng(0)
     draws = np.array([draw_year(generator, generator) for _ in range(lanes)])
-    blocks = np.zeros(1, block_dtype(lanes))
-    rows = blocks.view("f8").reshape(-1, lanes)
-    first = stands.parameters.shape[1]
-    rows[:first] = stands.parameters.T
-    rows[first : first + STATE_SIZE] = stands.state.T
-    rows[first + STATE_SIZE : first + STATE_SIZE + DRAWS_SIZE] = draws.T
+    blocks, _ = filled_block(
+        lanes,
+        stands.parameters,
+        stands.state,
+        draws,
+        np.full(lanes, NO_CHANGE),
+        first_cut_age=stands.first_cut_age,
+        products_decay=stands.products_decay,
+    )
     block, (observed, daily) = blocks[0], nothing(lanes)
     hours = hour_angles(STEPS_PER_DAY)
     begin_year(block)

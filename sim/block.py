@@ -44,17 +44,9 @@ def run_block(
     """
     number = len(parameters)
     lanes = lanes_for(number)
-    rows = aligned_zeros((block_dtype(lanes).itemsize // (8 * lanes), lanes))
-    block = np.ndarray(1, block_dtype(lanes), buffer=rows)
-    fill = np.minimum(np.arange(lanes), number - 1)
-    first = 0
-    for values in (parameters, state, draws):
-        rows[first : first + values.shape[1]] = values[fill].T
-        first += values.shape[1]
-    work = block[0]["w"]
-    work["density_change"], work["mix"] = (values[fill] for values in decode(actions))
-    work["first_cut_age"] = first_cut_age
-    work["products_decay"] = products_decay
+    block, rows = filled_block(
+        lanes, parameters, state, draws, actions, first_cut_age=first_cut_age, products_decay=products_decay
+    )
     forcing = np.zeros((0, 6, lanes)) if observed is None else np.repeat(observed[:, :, None], lanes, axis=2)
     output = np.zeros(0 if daily is None else days, daily_dtype(lanes))
     if backend == "numba":
@@ -68,6 +60,23 @@ def run_block(
     new_state = rows[first : first + STATE_SIZE, :number].T
     record = rows[first + STATE_SIZE + DRAWS_SIZE :][: len(RECORD), :number].T
     return new_state, record
+
+
+def filled_block(lanes, parameters, state, draws, actions, *, first_cut_age, products_decay):
+    """A block at the start of a year, its lanes filled as `run_block` says; returns it as an array of one record of
+    `block_dtype(lanes)`, and the same memory as rows, (fields, lanes)."""
+    rows = aligned_zeros((block_dtype(lanes).itemsize // (8 * lanes), lanes))
+    block = np.ndarray(1, block_dtype(lanes), buffer=rows)
+    fill = np.minimum(np.arange(lanes), len(parameters) - 1)
+    first = 0
+    for values in (parameters, state, draws):
+        rows[first : first + values.shape[1]] = values[fill].T
+        first += values.shape[1]
+    work = block[0]["w"]
+    work["density_change"], work["mix"] = (values[fill] for values in decode(actions))
+    work["first_cut_age"] = first_cut_age
+    work["products_decay"] = products_decay
+    return block, rows
 
 
 def aligned_zeros(shape) -> np.ndarray:

@@ -10,13 +10,13 @@ import numpy as np
 
 import sim
 from sim.account import clear_day, end_day
+from sim.block import filled_block
 from sim.day import begin_day
 from sim.forcing import hour_angles, step_weather
 from sim.jit import phase, specialised
-from sim.management import decode
 from sim.physical_constants import SECONDS_PER_DAY
 from sim.spin_up import climate_draws
-from sim.state import DAYS, DRAWS, block_dtype, daily_dtype
+from sim.state import DAYS, DRAWS, daily_dtype
 from sim.step import simulate_step
 from sim.year import begin_year, end_year
 
@@ -68,12 +68,15 @@ class RecordedStands(sim.Stands):
         than the stands'."""
         if options.get("steps_per_day", self.steps_per_day) == self.steps_per_day:
             number = len(stands)
-            block = np.zeros(1, block_dtype(number))
-            given = np.concatenate([self.parameters[stands], self.state[stands], draws], axis=1).T
-            block.view("f8").reshape(-1, number)[: len(given)] = given
-            work = block[0]["w"]
-            work["density_change"], work["mix"] = decode(actions)
-            work["first_cut_age"], work["products_decay"] = self.first_cut_age, self.products_decay
+            block, _ = filled_block(
+                number,
+                self.parameters[stands],
+                self.state[stands],
+                draws,
+                actions,
+                first_cut_age=self.first_cut_age,
+                products_decay=self.products_decay,
+            )
             surface = np.zeros((2, DAYS * self.steps_per_day, number))
             nothing = np.zeros((0, 6, number)), np.zeros(0, daily_dtype(number))
             kernel(number)(block[0], self.steps_per_day, *nothing, surface)
