@@ -2,65 +2,51 @@
 
     python analysis/profile_kernel.py [--lanes 16] [--output-dir results]
 
-A block of stands is stepped to four moments of the year. There each phase is called many times on the block as the
-phases before it leave it, and beside them the whole step. The phases' sum need not be the whole: alone, a phase finds
-its fields in the nearest cache, and what the compiler shares between phases is done twice. The physics is compiled
-phase by phase, which takes half a minute.
+A block of stands is stepped to four moments of the year. There a step is taken phase by phase, and each phase that it
+calls is called many times on the block as the phases before it left it; beside them the whole step. The phases' sum
+need not be the whole: alone, a phase finds its fields in the nearest cache, and what the compiler shares between phases
+is done twice. The physics is compiled phase by phase, which takes half a minute.
 """
 
 import statistics
 import time
+import types
 from dataclasses import dataclass
 from pathlib import Path
 
 import numba
 import numpy as np
 import pandas as pd
+from numba.core.dispatcher import Dispatcher
 
 from analysis.benchmark import per_step, started
 from analysis.machine import machine
 from cleanrl_style import protocol
-from sim import arrival, solve, step, transfer
-from sim.block import LANES
-from sim.day import begin_day, end_day
+from sim.account import clear_day, end_day
+from sim.block import LANES, filled_block
+from sim.canopy import solve_canopy
+from sim.day import begin_day
 from sim.draws import draw_year
+from sim.forcing import hour_angles, step_weather
 from sim.jit import OPTIONS
-from sim.state import DAILY, DRAWS_SIZE, STATE_SIZE, block_dtype
-from sim.year import begin_year, hour_angles
+from sim.physical_constants import SECONDS_PER_DAY
+from sim.response import answer_to_canopy
+from sim.state import daily_dtype
+from sim.step import simulate_step
+from sim.year import begin_year
 
 STEPS_PER_DAY = 48
-SECONDS = 86400.0 / STEPS_PER_DAY
+SECONDS = SECONDS_PER_DAY / STEPS_PER_DAY
 MOMENTS = {  # name -> (day, step of the day)
     "winter night": (30, 2),
     "winter noon": (30, 24),
     "summer night": (190, 2),
     "summer noon": (190, 24),
 }
+NO_CHANGE = 12  # the action that leaves a stand alone
 COPIES = 4  # of the block, taken in turn, so that the compiler cannot do once what is to be done every time
 CALLS = 400
-
-#: The phases of a step in their order: name -> (function, arguments after the block). The canopy is solved together
-#: with the conductances it starts from, which are taken off again.
-PHASES = {
-    "step_weather": (step.step_weather, "t, hours, SECONDS, observed"),
-    "stores_before": (step.stores_before, "SECONDS"),
-    "any_sun": (arrival.any_sun, ""),
-    "sunlight": (arrival.sunlight, ""),
-    "darkness": (arrival.darkness, ""),
-    "any_snow": (arrival.any_snow, ""),
-    "snowfall": (arrival.snowfall, "SECONDS"),
-    "no_snow": (arrival.no_snow, ""),
-    "rainfall": (arrival.rainfall, ""),
-    "ground_exchange": (solve.ground_exchange, ""),
-    "snow_vapour": (solve.snow_vapour, "SECONDS"),
-    "conductances": (solve.conductances, "SECONDS"),
-    "solve_canopy": (solve.solve_canopy, ""),
-    "move_energy_and_water": (transfer.move_energy_and_water, "SECONDS"),
-    "move_carbon": (transfer.move_carbon, "SECONDS"),
-    "balance": (step.balance, "SECONDS"),
-}
-WHOLE = [PHASES["step_weather"], (step.simulate_step, "SECONDS")]
-DAYS = {"begin_day": (begin_day, "day, observed"), "end_day": (end_day, "day, 48, daily")}  # once a day
+DAYS = (begin_day, clear_day, end_day)  # once a day
 
 
 @dataclass
@@ -75,20 +61,49 @@ class Args:
     """folder for profile_kernel.csv"""
 
 
-def repeated(*calls: tuple):
-    """A compiled function (blocks, number, day, t, hours, observed, daily) that makes the calls."""
-    names = {f"phase_{k}": function for k, (function, _) in enumerate(calls)}
-    lines = [f"        phase_{k}({', '.join(filter(None, ['block', given]))})" for k, (_, given) in enumerate(calls)]
+def phases() -> dict[str, Dispatcher]:
+    """The functions that a step calls, in the order of its source."""
+    names, found = simulate_step.py_func.__code__.co_names, simulate_step.py_func.__globals__
+    return {name: found[name] for name in names if isinstance(found.get(name), Dispatcher)}
+
+
+def calls_of_step(blocks: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    """The phases that a step of this block calls, in turn, each with the block as it finds it; advances the block."""
+    calls = []
+
+    def noted(name, function):
+        def call(b, *arguments):
+            calls.append((name, blocks.copy()))
+            return function(b, *arguments)
+
+        return call
+
+    source = simulate_step.py_func
+    namespace = source.__globals__ | {name: noted(name, function) for name, function in phases().items()}
+    types.FunctionType(source.__code__, namespace)(blocks[0], SECONDS)
+    return calls
+
+
+def repeated(*functions: Dispatcher):
+    """A compiled function (blocks, number, day, t, hours, observed, daily) that calls the functions, in turn, with what
+    each asks for by name."""
+    given = {"b": "block", "seconds": "SECONDS", "steps": "STEPS_PER_DAY"}
+    lines = []
+    for k, function in enumerate(functions):
+        code = function.py_func.__code__
+        names = code.co_varnames[: code.co_argcount]
+        lines.append(f"        phase_{k}({', '.join(given.get(name, name) for name in names)})")
     source = "def run(blocks, number, day, t, hours, observed, daily):\n"
     source += "    for k in range(number):\n        block = blocks[k % len(blocks)]\n" + "\n".join(lines)
-    namespace = {**names, "SECONDS": SECONDS}
+    namespace = {f"phase_{k}": function for k, function in enumerate(functions)}
+    namespace |= {"SECONDS": SECONDS, "STEPS_PER_DAY": STEPS_PER_DAY}
     exec(source, namespace)
     return numba.njit(**OPTIONS)(namespace["run"])
 
 
 def nothing(lanes: int) -> tuple[np.ndarray, np.ndarray]:
     """No observed forcing, no daily output."""
-    return np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes))
+    return np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes))
 
 
 def blocks_at(moments: dict, lanes: int) -> dict[str, tuple]:
@@ -96,23 +111,27 @@ def blocks_at(moments: dict, lanes: int) -> dict[str, tuple]:
     stands = started(lanes, threads=1)
     generator = np.random.default_rng(0)
     draws = np.array([draw_year(generator, generator) for _ in range(lanes)])
-    blocks = np.zeros(1, block_dtype(lanes))
-    rows = blocks.view("f8").reshape(-1, lanes)
-    first = stands.parameters.shape[1]
-    rows[:first] = stands.parameters.T
-    rows[first : first + STATE_SIZE] = stands.state.T
-    rows[first + STATE_SIZE : first + STATE_SIZE + DRAWS_SIZE] = draws.T
+    blocks, _ = filled_block(
+        lanes,
+        stands.parameters,
+        stands.state,
+        draws,
+        np.full(lanes, NO_CHANGE),
+        first_cut_age=stands.first_cut_age,
+        products_decay=stands.products_decay,
+    )
     block, (observed, daily) = blocks[0], nothing(lanes)
     hours = hour_angles(STEPS_PER_DAY)
     begin_year(block)
     found = {}
     for day in range(1 + max(day for day, _ in moments.values())):
         begin_day(block, day, observed)
+        clear_day(block, day, daily)
         for t in range(STEPS_PER_DAY):
             now = blocks.copy(), day, t, hours
             found |= {name: now for name, moment in moments.items() if moment == (day, t)}
-            step.step_weather(block, t, hours, SECONDS, observed)
-            step.simulate_step(block, SECONDS)
+            step_weather(block, t, hours, SECONDS, observed)
+            simulate_step(block, SECONDS)
         end_day(block, day, STEPS_PER_DAY, daily)
     return found
 
@@ -133,28 +152,24 @@ def time_calls(function, blocks: np.ndarray, now: tuple, repeats: int) -> float:
 
 def where_time_goes(lanes: int = LANES, repeats: int = 15) -> pd.DataFrame:
     """Time of a step [ns per stand]: a row a phase, then their sum, the whole step, and what is done once a day, as
-    its part of a step; a column a moment."""
-    functions = {name: repeated(phase) for name, phase in {**PHASES, **DAYS}.items()}
-    functions["whole step"] = repeated(*WHOLE)
-    functions["solve_canopy"] = repeated(PHASES["conductances"], PHASES["solve_canopy"])
-    table = pd.DataFrame(0.0, index=[*PHASES, "sum", "whole step", *DAYS], columns=list(MOMENTS))
+    its part of a step; a column a moment. The canopy is solved together with the answer of the other nodes, from which
+    it starts, and which is taken off again."""
+    steps = {"step_weather": step_weather, **phases()}
+    days = {function.__name__: function for function in DAYS}
+    functions = {name: repeated(function) for name, function in (steps | days).items()}
+    functions["solve_canopy"] = repeated(answer_to_canopy, solve_canopy)
+    whole = repeated(step_weather, simulate_step)
+    table = pd.DataFrame(0.0, index=[*steps, "sum", "whole step", *days], columns=list(MOMENTS))
     for moment, (blocks, *now) in blocks_at(MOMENTS, lanes).items():
-        table.loc["whole step", moment] = time_calls(functions["whole step"], blocks, now, repeats)
-        for name in DAYS:
+        table.loc["whole step", moment] = time_calls(whole, blocks, now, repeats)
+        for name in days:
             table.loc[name, moment] = time_calls(functions[name], blocks, now, repeats) / STEPS_PER_DAY
-        observed, daily = nothing(lanes)
-        left_out = []
-        for name in PHASES:
-            if name in left_out:
-                continue
-            table.loc[name, moment] = time_calls(functions[name], blocks, now, repeats)
-            functions[name](blocks, 1, *now, observed, daily)
-            if name == "any_sun":
-                left_out.append("darkness" if arrival.any_sun(blocks[0]) else "sunlight")
-            if name == "any_snow":
-                left_out += ["no_snow"] if arrival.any_snow(blocks[0]) else ["snowfall", "snow_vapour"]
-        table.loc["solve_canopy", moment] -= table.loc["conductances", moment]
-        table.loc["sum", moment] = table.loc[list(PHASES), moment].sum()
+        table.loc["step_weather", moment] = time_calls(functions["step_weather"], blocks, now, repeats)
+        step_weather(blocks[0], *now[1:], SECONDS, nothing(lanes)[0])
+        for name, found in calls_of_step(blocks):
+            table.loc[name, moment] = time_calls(functions[name], found, now, repeats)
+        table.loc["solve_canopy", moment] -= table.loc["answer_to_canopy", moment]
+        table.loc["sum", moment] = table.loc[list(steps), moment].sum()
     return table
 
 

@@ -30,11 +30,11 @@ from sim.closure import TOLERANCES
 from sim.demography import AGES
 from sim.management import LARGEST_DENSITY, LEAST_DENSITY
 from sim.parameters import ORDERED_CONSTANTS, Parameter
-from sim.snow import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
+from sim.physical_constants import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.spin_up import CLASS_NAMES, INITIAL_LIMITS
 from sim.stands import available_cores
-from sim.state import DAILY, DAYS, PARAMETER_NAMES, STATE_NAMES
-from sim.year import LEAST_TRUNK_CAPACITY
+from sim.state import DAILY_NAMES, DAYS, PARAMETER_NAMES, STATE_NAMES
+from sim.trunk import LEAST_TRUNK_CAPACITY
 
 
 @dataclass(frozen=True)
@@ -319,7 +319,7 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
 def check_year(outcome: Outcome, year: int, stands: sim.Stands, before, record, daily) -> None:
     """Note the year's residuals and extremes, and everything that failed, in the batch's outcome."""
     r = dict(zip(sim.RECORD_NAMES, record.T, strict=True))
-    d = dict(zip(DAILY, np.moveaxis(daily, 2, 0), strict=True))
+    d = dict(zip(DAILY_NAMES, np.moveaxis(daily, 2, 0), strict=True))
     s = dict(zip(STATE_NAMES, stands.state.T, strict=False))
     p = dict(zip(PARAMETER_NAMES, stands.parameters.T, strict=True))
 

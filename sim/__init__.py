@@ -1,13 +1,21 @@
 """The simulator of a boreal stand: energy, water, carbon, demography, disturbance and management.
 
-`simulate` runs one stand and returns a table; `Stands` steps many, for the environment. `sample_site` draws the 62
+`simulate` runs one stand and returns a table; `Stands` steps many, for the environment. `sample_site` draws the
 parameters of a site. `docs/model.md` has the equations.
 """
 
 from sim.closure import PhysicsError
 from sim.draws import Seeds, episode_seeds
 from sim.jit import cache_folder
-from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS, middle_site, sample_site, scale_site
+from sim.parameters import (
+    CONSTANTS,
+    MECHANISMS,
+    OBSERVED_SITE_PARAMETERS,
+    SITE_PARAMETERS,
+    middle_site,
+    sample_site,
+    scale_site,
+)
 from sim.simulate import simulate
 from sim.spin_up import INITIAL_RANGES
 from sim.stands import Stands
@@ -17,6 +25,7 @@ __all__ = [
     "CONSTANTS",
     "INITIAL_RANGES",
     "MECHANISMS",
+    "OBSERVED_SITE_PARAMETERS",
     "RECORD_NAMES",
     "SITE_PARAMETERS",
     "PhysicsError",

@@ -1,11 +1,16 @@
-"""The year's account: stocks at its beginning and end, means, and what it failed to close."""
+"""The account of a step, a day and a year: sums, means, extremes, stocks, and what failed to close."""
 
 import math
 
-from sim.demography import OLDEST, SAPLING_LIMIT, SEEDLING_LIMIT, count
-from sim.jit import phase
-from sim.soil import thaw_depth
-from sim.weather import FREEZING_POINT_K
+from sim.demography import class_ages, count_classes, count_stand
+from sim.jit import compiled, phase
+from sim.physical_constants import DAYS_PER_YEAR, LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
+from sim.snow import SNOW_DAY_MM
+from sim.soil import active_layer
+from sim.weather import december_to_march, season
+
+GROWING_SEASON_C = 5.0
+SPRING_ENDS = 212  # day of year after which remaining snow is not spring's
 
 
 @phase
@@ -15,7 +20,8 @@ def clear_year(b, i):
     w.biomass_before[i] = s.conifer_biomass[i] + s.deciduous_biomass[i]
     w.soil_before[i] = s.soil_carbon[i]
     w.products_before[i] = s.products[i]
-    w.stems_before[i] = count(s.conifer_stems, i, 0, OLDEST) + count(s.deciduous_stems, i, 0, OLDEST)
+    conifers, deciduous = count_stand(b, i)
+    w.stems_before[i] = conifers + deciduous
     w.stems_gain[i] = 0.0
     w.summer_up[i] = 0.0
     w.summer_down[i] = 0.0
@@ -28,24 +34,168 @@ def clear_year(b, i):
 
 
 @phase
+def clear_day(b, day, daily):
+    """Clear the day's sums; of what the year adds up, the day's row of `daily` keeps the sums before the day."""
+    w = b.w
+    for i in range(len(b.s.swe)):
+        w.reflected_sum[i] = 0.0
+        w.shortwave_sum[i] = 0.0
+        w.soil_heat_sum[i] = 0.0
+        w.air_sum[i] = 0.0
+        w.canopy_sum[i] = 0.0
+        w.ground_sum[i] = 0.0
+        w.top_sum[i] = 0.0
+        w.surface_sum[i] = 0.0
+        w.deep_sum[i] = 0.0
+    if len(daily) > 0:
+        note_sums(b, daily[day])
+
+
+@phase
+def note_sums(b, row):
+    """The year's sums before the day, in the columns of `sim.state.DAILY` that are what the day adds to them."""
+    r = b.r
+    for i in range(len(b.s.swe)):
+        row.gpp_kgc_m2[i] = r.gpp_kgc_m2[i]
+        row.autotrophic_respiration_kgc_m2[i] = r.autotrophic_respiration_kgc_m2[i]
+        row.heterotrophic_respiration_kgc_m2[i] = r.heterotrophic_respiration_kgc_m2[i]
+        row.shortwave_mj_m2[i] = r.shortwave_mj_m2[i]
+        row.net_radiation_mj_m2[i] = r.net_radiation_mj_m2[i]
+        row.sensible_heat_mj_m2[i] = r.sensible_heat_mj_m2[i]
+        row.latent_heat_mj_m2[i] = r.latent_heat_mj_m2[i]
+        row.boundary_heat_mj_m2[i] = r.boundary_warming_mj_m2[i] - r.boundary_cooling_mj_m2[i]
+        row.evapotranspiration_mm[i] = r.evapotranspiration_mm[i]
+        row.runoff_mm[i] = r.runoff_mm[i]
+
+
+@compiled
+def add_step(b, seconds):
+    """Add the step's fluxes and temperatures to the account."""
+    s, w, r = b.s, b.w, b.r
+    for i in range(len(s.swe)):
+        sublimated = w.sublimated[i] + w.canopy_sublimation[i]
+        r.precipitation_mm[i] += w.precipitation_step[i]
+        r.snowfall_mm[i] += w.snow[i]
+        r.evapotranspiration_mm[i] += w.vapour_lost[i]
+        r.transpiration_mm[i] += w.transpired[i]
+        r.sublimation_mm[i] += sublimated
+        r.canopy_sublimation_mm[i] += w.canopy_sublimation[i]
+        r.runoff_mm[i] += w.runoff[i]
+        r.shortwave_mj_m2[i] += 1e-6 * seconds * w.shortwave[i]
+        r.net_radiation_mj_m2[i] += 1e-6 * seconds * w.net_stand[i]
+        r.sensible_heat_mj_m2[i] += 1e-6 * seconds * w.sensible[i]
+        r.latent_heat_mj_m2[i] += 1e-6 * (LATENT_HEAT_VAPORISATION * w.vapour_lost[i] + LATENT_HEAT_FUSION * sublimated)
+        r.ground_shortwave_mj_m2[i] += 1e-6 * seconds * w.ground_sw[i]
+        r.boundary_warming_mj_m2[i] += 1e-6 * seconds * max(w.deep_to_boundary[i], 0.0)
+        r.boundary_cooling_mj_m2[i] += 1e-6 * seconds * max(-w.deep_to_boundary[i], 0.0)
+        r.snow_heat_mj_m2[i] += 1e-6 * (w.advected[i] - w.carried[i])
+        r.deep_heat_gain_mj_m2[i] += 1e-6 * seconds * (w.surface_to_deep[i] - w.deep_to_boundary[i])
+        w.reflected_sum[i] += w.reflected[i]
+        w.shortwave_sum[i] += w.shortwave[i]
+        w.soil_heat_sum[i] += 1e-6 * seconds * w.ground_to_surface[i]
+        w.thaw_warmth[i] += seconds * max(s.ground[i], 0.0)
+        # A melting snowpack is at 0 degC but for round-off.
+        w.thaw_seconds[i] += seconds if s.ground[i] > 1e-6 else 0.0
+        w.air_sum[i] += w.air[i]
+        w.canopy_sum[i] += s.canopy[i]
+        w.ground_sum[i] += s.ground[i]
+        w.top_sum[i] += w.soil_top[i]
+        w.surface_sum[i] += w.surface[i]
+        w.deep_sum[i] += w.deep[i]
+        r.canopy_residual_w_m2[i] = max(r.canopy_residual_w_m2[i], abs(w.residual[i]))
+
+
+@phase
+def end_day(b, day, steps, daily):
+    """Add the day to the year's account, and write its row of `daily` if that is wanted."""
+    s, w, r = b.s, b.w, b.r
+    summer = 1.0 if season(day) == 2 else 0.0
+    winter = 1.0 if december_to_march(day) else 0.0
+    december_to_february = 1.0 if season(day) == 0 else 0.0
+    spring = day < SPRING_ENDS
+    for i in range(len(s.swe)):
+        air = w.air_sum[i] / steps
+        w.summer_up[i] += summer * w.reflected_sum[i]
+        w.summer_down[i] += summer * w.shortwave_sum[i]
+        w.winter_up[i] += winter * w.reflected_sum[i]
+        w.winter_down[i] += winter * w.shortwave_sum[i]
+        w.winter_air[i] += december_to_february * air
+        w.winter_days[i] += december_to_february
+        r.growing_season_days[i] += 1.0 if air > GROWING_SEASON_C else 0.0
+        snowy = s.swe[i] > SNOW_DAY_MM
+        r.snow_days[i] += 1.0 if snowy else 0.0
+        r.snow_off_doy[i] = day + 2.0 if snowy and spring else r.snow_off_doy[i]
+        r.peak_swe_mm[i] = max(r.peak_swe_mm[i], s.swe[i])
+        r.max_lai[i] = max(r.max_lai[i], w.lai_conifer[i] + w.lai_deciduous[i])
+        r.air_temperature_c[i] += air / DAYS_PER_YEAR
+        r.ground_temperature_c[i] += w.ground_sum[i] / (steps * DAYS_PER_YEAR)
+        r.soil_top_temperature_c[i] += w.top_sum[i] / (steps * DAYS_PER_YEAR)
+        r.surface_soil_temperature_c[i] += w.surface_sum[i] / (steps * DAYS_PER_YEAR)
+        r.deep_soil_temperature_c[i] += w.deep_sum[i] / (steps * DAYS_PER_YEAR)
+    if len(daily) > 0:
+        write_day(b, steps, daily[day])
+
+
+@phase
+def write_day(b, steps, row):
+    """A day's row of daily output, columns as in `sim.state.DAILY`."""
+    s, w, r = b.s, b.w, b.r
+    for i in range(len(s.swe)):
+        row.air_temperature_c[i] = w.air_sum[i] / steps
+        row.precipitation_mm[i] = w.precipitation[i]
+        row.gpp_kgc_m2[i] = r.gpp_kgc_m2[i] - row.gpp_kgc_m2[i]
+        row.autotrophic_respiration_kgc_m2[i] = (
+            r.autotrophic_respiration_kgc_m2[i] - row.autotrophic_respiration_kgc_m2[i]
+        )
+        row.heterotrophic_respiration_kgc_m2[i] = (
+            r.heterotrophic_respiration_kgc_m2[i] - row.heterotrophic_respiration_kgc_m2[i]
+        )
+        row.shortwave_mj_m2[i] = r.shortwave_mj_m2[i] - row.shortwave_mj_m2[i]
+        row.net_radiation_mj_m2[i] = r.net_radiation_mj_m2[i] - row.net_radiation_mj_m2[i]
+        row.sensible_heat_mj_m2[i] = r.sensible_heat_mj_m2[i] - row.sensible_heat_mj_m2[i]
+        row.latent_heat_mj_m2[i] = r.latent_heat_mj_m2[i] - row.latent_heat_mj_m2[i]
+        row.ground_heat_mj_m2[i] = w.soil_heat_sum[i]
+        row.boundary_heat_mj_m2[i] = (
+            r.boundary_warming_mj_m2[i] - r.boundary_cooling_mj_m2[i] - row.boundary_heat_mj_m2[i]
+        )
+        row.evapotranspiration_mm[i] = r.evapotranspiration_mm[i] - row.evapotranspiration_mm[i]
+        row.runoff_mm[i] = r.runoff_mm[i] - row.runoff_mm[i]
+        row.swe_mm[i] = s.swe[i]
+        row.canopy_snow_mm[i] = s.canopy_snow[i]
+        row.soil_water_mm[i] = s.soil_water[i]
+        row.canopy_temperature_c[i] = w.canopy_sum[i] / steps
+        row.ground_temperature_c[i] = w.ground_sum[i] / steps
+        row.surface_soil_temperature_c[i] = w.surface_sum[i] / steps
+        row.deep_soil_temperature_c[i] = w.deep_sum[i] / steps
+        row.albedo[i] = w.reflected_sum[i] / w.shortwave_sum[i] if w.shortwave_sum[i] > 0.0 else math.nan
+        row.lai[i] = w.lai_conifer[i] + w.lai_deciduous[i]
+        row.organic_layer_m[i] = s.organic_depth[i]
+        row.soil_top_temperature_c[i] = w.top_sum[i] / steps
+
+
+@phase
 def write_record(b, i):
     """5 of the timeline: stocks at the year's end, means, and what the year failed to close."""
     s, p, w, r = b.s, b.p, b.w, b.r
-    young, mature = int(p.young_age_limit[i]), int(p.mature_age_limit[i])
-    conifers = count(s.conifer_stems, i, 0, OLDEST)
-    density = conifers + count(s.deciduous_stems, i, 0, OLDEST)
+    conifers, deciduous = count_stand(b, i)
+    density = conifers + deciduous
     r.density_stems_ha[i] = density
     r.conifer_fraction[i] = conifers / density if density > 0.0 else 0.0
-    r.conifer_seedling_stems_ha[i] = count(s.conifer_stems, i, 0, SEEDLING_LIMIT)
-    r.conifer_sapling_stems_ha[i] = count(s.conifer_stems, i, SEEDLING_LIMIT + 1, SAPLING_LIMIT)
-    r.conifer_young_stems_ha[i] = count(s.conifer_stems, i, SAPLING_LIMIT + 1, young)
-    r.conifer_mature_stems_ha[i] = count(s.conifer_stems, i, young + 1, mature)
-    r.conifer_old_stems_ha[i] = count(s.conifer_stems, i, mature + 1, OLDEST)
-    r.deciduous_seedling_stems_ha[i] = count(s.deciduous_stems, i, 0, SEEDLING_LIMIT)
-    r.deciduous_sapling_stems_ha[i] = count(s.deciduous_stems, i, SEEDLING_LIMIT + 1, SAPLING_LIMIT)
-    r.deciduous_young_stems_ha[i] = count(s.deciduous_stems, i, SAPLING_LIMIT + 1, young)
-    r.deciduous_mature_stems_ha[i] = count(s.deciduous_stems, i, young + 1, mature)
-    r.deciduous_old_stems_ha[i] = count(s.deciduous_stems, i, mature + 1, OLDEST)
+    ages = class_ages(int(p.young_age_limit[i]), int(p.mature_age_limit[i]))
+    (
+        r.conifer_seedling_stems_ha[i],
+        r.conifer_sapling_stems_ha[i],
+        r.conifer_young_stems_ha[i],
+        r.conifer_mature_stems_ha[i],
+        r.conifer_old_stems_ha[i],
+    ) = count_classes(s.conifer_stems, i, ages)
+    (
+        r.deciduous_seedling_stems_ha[i],
+        r.deciduous_sapling_stems_ha[i],
+        r.deciduous_young_stems_ha[i],
+        r.deciduous_mature_stems_ha[i],
+        r.deciduous_old_stems_ha[i],
+    ) = count_classes(s.deciduous_stems, i, ages)
 
     r.biomass_kgc_m2[i] = s.conifer_biomass[i] + s.deciduous_biomass[i]
     r.soil_kgc_m2[i] = s.soil_carbon[i]
@@ -67,20 +217,4 @@ def write_record(b, i):
     r.summer_albedo[i] = w.summer_up[i] / w.summer_down[i] if w.summer_down[i] > 0.0 else math.nan
     r.winter_albedo[i] = w.winter_up[i] / w.winter_down[i] if w.winter_down[i] > 0.0 else math.nan
     r.organic_layer_m[i] = s.organic_depth[i]
-    freezes = p.soil_freezing[i]
-    thawed, frozen = p.soil_heat_capacity_thawed[i], p.soil_heat_capacity_frozen[i]
-    r.active_layer_depth_m[i] = thaw_depth(
-        s.organic_depth[i] * p.moss[i],
-        w.thaw_warmth[i],
-        w.thaw_seconds[i],
-        r.deep_soil_temperature_c[i],
-        p.deep_boundary_temperature_k[i] - FREEZING_POINT_K,
-        p.deep_soil_node_m[i],
-        p.boundary_depth_m[i],
-        p.soil_conductivity[i],
-        p.soil_conductivity[i] * w.frozen_ratio[i],
-        p.organic_conductivity_thawed[i],
-        thawed,
-        thawed + freezes * (frozen - thawed),
-        w.surface_latent[i] / p.surface_soil_depth_m[i],
-    )
+    r.active_layer_depth_m[i] = active_layer(b, i)

@@ -12,7 +12,7 @@ import numpy as np
 
 from sim.jit import specialised, uncompiled
 from sim.management import decode
-from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype
+from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype, daily_dtype
 from sim.year import simulate_year
 
 LANES = 16
@@ -44,9 +44,30 @@ def run_block(
     """
     number = len(parameters)
     lanes = lanes_for(number)
+    block, rows = filled_block(
+        lanes, parameters, state, draws, actions, first_cut_age=first_cut_age, products_decay=products_decay
+    )
+    forcing = np.zeros((0, 6, lanes)) if observed is None else np.repeat(observed[:, :, None], lanes, axis=2)
+    output = np.zeros(0 if daily is None else days, daily_dtype(lanes))
+    if backend == "numba":
+        kernel(lanes)(block, steps_per_day, days, forcing, output)
+    else:
+        with np.errstate(all="ignore"):
+            interpreted()([namespace(block[0])], steps_per_day, days, forcing, [namespace(row) for row in output])
+    if daily is not None:
+        daily[:] = output.view(float).reshape(days, len(DAILY), lanes)[:, :, :number].transpose(2, 0, 1)
+    first = parameters.shape[1]
+    new_state = rows[first : first + STATE_SIZE, :number].T
+    record = rows[first + STATE_SIZE + DRAWS_SIZE :][: len(RECORD), :number].T
+    return new_state, record
+
+
+def filled_block(lanes, parameters, state, draws, actions, *, first_cut_age, products_decay):
+    """A block at the start of a year, its lanes filled as `run_block` says; returns it as an array of one record of
+    `block_dtype(lanes)`, and the same memory as rows, (fields, lanes)."""
     rows = aligned_zeros((block_dtype(lanes).itemsize // (8 * lanes), lanes))
     block = np.ndarray(1, block_dtype(lanes), buffer=rows)
-    fill = np.minimum(np.arange(lanes), number - 1)
+    fill = np.minimum(np.arange(lanes), len(parameters) - 1)
     first = 0
     for values in (parameters, state, draws):
         rows[first : first + values.shape[1]] = values[fill].T
@@ -55,19 +76,7 @@ def run_block(
     work["density_change"], work["mix"] = (values[fill] for values in decode(actions))
     work["first_cut_age"] = first_cut_age
     work["products_decay"] = products_decay
-    forcing = np.zeros((0, 6, lanes)) if observed is None else np.repeat(observed[:, :, None], lanes, axis=2)
-    output = np.zeros((0 if daily is None else days, len(DAILY), lanes))
-    if backend == "numba":
-        kernel(lanes)(block, steps_per_day, days, forcing, output)
-    else:
-        with np.errstate(all="ignore"):
-            interpreted()([namespace(block[0])], steps_per_day, days, forcing, output)
-    if daily is not None:
-        daily[:] = output[:, :, :number].transpose(2, 0, 1)
-    first = parameters.shape[1]
-    new_state = rows[first : first + STATE_SIZE, :number].T
-    record = rows[first + STATE_SIZE + DRAWS_SIZE :][: len(RECORD), :number].T
-    return new_state, record
+    return block, rows
 
 
 def aligned_zeros(shape) -> np.ndarray:
@@ -79,10 +88,9 @@ def aligned_zeros(shape) -> np.ndarray:
 
 
 def namespace(record):
-    """A block as plain attributes, for the interpreter."""
-    return SimpleNamespace(
-        **{group: SimpleNamespace(**{n: record[group][n] for n in record[group].dtype.names}) for group in "pswrd"}
-    )
+    """A numpy record, and the records in it, as plain attributes for the interpreter."""
+    fields = ((name, record[name]) for name in record.dtype.names)
+    return SimpleNamespace(**{name: namespace(value) if value.dtype.names else value for name, value in fields})
 
 
 def kernel(lanes: int):
@@ -107,4 +115,4 @@ def compile_kernels(number: int) -> None:
     """Have the kernels ready that so many stands need, so that processes forked later find them."""
     for lanes in sorted({lanes_for(b.stop - b.start) for b in blocks(number)}):
         block = np.zeros(1, block_dtype(lanes))
-        kernel(lanes)(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros((0, len(DAILY), lanes)))
+        kernel(lanes)(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes)))

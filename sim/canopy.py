@@ -1,55 +1,16 @@
-"""Canopy: structure through the year, and the energy balance that sets its temperature.
+"""Canopy: the energy balance that sets its temperature, and its solution.
 
 The canopy stores no heat; its temperature is where radiation, sensible heat, evaporation, photosynthesis, snow and
-the trunk balance. The ground and the trunk answer to it within the same step (`sim.soil.respond_to_canopy`), so that
+the trunk balance. The ground and the trunk answer to it within the same step (`sim.response`), so that
 all nodes exchange radiation at the same temperatures.
 """
 
-import math
-
 from sim.jit import compiled
-from sim.mathematics import exponential
+from sim.physical_constants import FREEZING_POINT_K, STEFAN_BOLTZMANN
 from sim.radiation import black_body, black_body_slope, longwave_down, longwave_up
-from sim.snow import VON_KARMAN
-from sim.weather import FREEZING_POINT_K, STEFAN_BOLTZMANN
 
 NEWTON_TOLERANCE = 1e-7  # W m-2
 NEWTON_LIMIT = 60  # iterations; bisection alone would need 50
-
-
-@compiled
-def crown_factor(age, seedling, sapling, young, mature, old) -> float:
-    """Crown area of a stem relative to a mature one, straight lines between the values at 3, 13, 30, 70, 101 years."""
-    if age < 3:
-        return seedling * age / 3.0
-    if age < 13:
-        return seedling + (sapling - seedling) * (age - 3.0) / 10.0
-    if age < 30:
-        return sapling + (young - sapling) * (age - 13.0) / 17.0
-    if age < 70:
-        return young + (mature - young) * (age - 30.0) / 40.0
-    return mature + (old - mature) * (min(age, 101.0) - 70.0) / 31.0
-
-
-@compiled
-def leaf_out(day, start, spring_rate, fall, autumn_rate) -> float:
-    """Share of the deciduous leaf area that is out: half on the start and the fall day, logistic in between."""
-    spring = 1.0 / (1.0 + exponential(-spring_rate * (day + 1.0 - start)))
-    autumn = 1.0 / (1.0 + exponential(autumn_rate * (day + 1.0 - fall)))
-    return spring * autumn
-
-
-@compiled
-def aerodynamic_conductance(wind, roughness, height, excess) -> float:
-    """Conductance for heat [m s-1] between canopy and air, neutral logarithmic profile (Garratt 1992, Eq. 3.38)."""
-    momentum = math.log(height / roughness + 1.0)
-    return VON_KARMAN * VON_KARMAN * wind / (momentum * (momentum + excess))
-
-
-@compiled
-def stress_ramp(value, zero, slope) -> float:
-    """Linear ramp, 0 at `zero`, up to 1; MOD17's scalars of minimum temperature and vapour pressure deficit."""
-    return min(max((value - zero) * slope, 0.0), 1.0)
 
 
 @compiled
@@ -140,3 +101,62 @@ def newton_step(trial, residual, slope, by_emission, low, high):
     inside = low < newton and newton < high
     proposal = newton if inside else 0.5 * (low + high)
     return proposal, low, high
+
+
+@compiled
+def newton_iteration(b):
+    """Balance of the canopies at their trial temperatures; those that are off get another. Returns how many."""
+    s, p, w = b.s, b.p, b.w
+    moved = 0
+    for i in range(len(s.swe)):
+        trial, low, high = w.trial[i], w.low[i], w.high[i]
+        residual, slope, by_emission, w.net[i], w.ground_new[i] = canopy_balance(
+            trial,
+            w.fixed[i],
+            w.canopy_sw[i],
+            w.sky[i],
+            w.longwave_cover[i],
+            p.ground_emissivity[i],
+            s.ground[i],
+            w.melt_span[i],
+            w.bare_gain[i],
+            w.ground_base[i],
+            w.ground_by_emission[i],
+            w.ground_by_canopy[i],
+            w.trunk_base[i],
+            w.trunk_by_canopy[i],
+            w.trunk_by_ground[i],
+            w.trunk_canopy[i],
+            w.air[i],
+            w.canopy_air[i],
+            w.dry_coefficient[i],
+            w.wet_coefficient[i],
+            w.wet_limit[i],
+        )
+        off = abs(residual) > NEWTON_TOLERANCE  # not where it is no number: that stays, for closure to find
+        proposal, low, high = newton_step(trial, residual, slope, by_emission, low, high)
+        w.residual[i] = residual
+        w.trial[i] = proposal if off else trial
+        w.low[i] = low
+        w.high[i] = high
+        moved += 1 if off else 0
+    return moved
+
+
+@compiled
+def start_canopy(b):
+    """Trial temperatures of the canopies, and brackets about their solutions."""
+    s, w = b.s, b.w
+    for i in range(len(s.swe)):
+        w.trial[i] = s.canopy[i]
+        w.low[i] = w.air[i] - 100.0
+        w.high[i] = w.air[i] + 300.0  # a few trees in calm air, and a low sun that shines on nothing else
+
+
+@compiled
+def solve_canopy(b):
+    """Newton's method for all lanes together; a lane that has converged stays where it is."""
+    start_canopy(b)
+    iterations = 0
+    while newton_iteration(b) > 0 and iterations < NEWTON_LIMIT:
+        iterations += 1

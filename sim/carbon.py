@@ -1,16 +1,10 @@
-"""Photosynthesis, respiration, litter. Fluxes in kgC m-2 per second or per day, pools in kgC m-2."""
+"""Respiration, litter and decay: carbon moved between air, trees, soil and products. Pools in kgC m-2."""
 
-from sim.jit import compiled
+import math
+
+from sim.jit import compiled, phase
 from sim.mathematics import exponential
-
-SECONDS_PER_YEAR = 365.0 * 86400.0
-
-
-@compiled
-def photosynthesis(intercepted, leaf_share, efficiency, par_fraction, temperature_stress, vpd_stress, stress) -> float:
-    """Gross production [kgC m-2 s-1] by light use (Monteith 1972; MOD17): intercepted shortwave [W m-2] x the
-    leaves' share of it x efficiency [gC MJ-1], reduced by cold, dry air and dry soil."""
-    return 1e-9 * par_fraction * intercepted * leaf_share * efficiency * temperature_stress * vpd_stress * stress
+from sim.physical_constants import DAYS_PER_YEAR, SECONDS_PER_YEAR
 
 
 @compiled
@@ -37,6 +31,67 @@ def autotrophic(gross, maintained, growth_share, biomass, seconds) -> float:
 @compiled
 def litter_share(day, fall, window, seasonality) -> float:
     """Share of the year's litter that falls on this day: `seasonality` of it in the autumn window."""
-    start = min(max(fall - 15.0, 0.0), 365.0 - window)
+    start = min(max(fall - 15.0, 0.0), DAYS_PER_YEAR - window)
     inside = start <= day < start + window
-    return seasonality / window if inside else (1.0 - seasonality) / (365.0 - window)
+    return seasonality / window if inside else (1.0 - seasonality) / (DAYS_PER_YEAR - window)
+
+
+@compiled
+def respiration_rates(b, i):
+    """Rates of the year at the reference temperature, and the logarithm of their Q10."""
+    p, w = b.p, b.w
+    w.log_q10[i] = math.log(p.q10[i])
+    w.leaf_rate[i], w.wood_rate[i] = maintenance_rates(
+        p.base_respiration[i], p.maintenance_leaf_share[i], p.reference_lai[i], p.reference_biomass_kgc_m2[i]
+    )
+    w.soil_rate[i] = p.soil_respiration[i] / (p.reference_soil_carbon[i] * SECONDS_PER_YEAR)
+
+
+@phase
+def litter(b, day):
+    """Litter of the day, from trees to soil."""
+    s, p, r = b.s, b.p, b.r
+    for i in range(len(s.swe)):
+        share = p.litterfall_fraction[i] * litter_share(
+            day, p.fall_start_day[i], p.litter_window_days[i], p.litterfall_seasonality[i]
+        )
+        conifer = min(share, 1.0) * s.conifer_biomass[i]
+        deciduous = min(share * p.deciduous_litter_ratio[i], 1.0) * s.deciduous_biomass[i]
+        s.conifer_biomass[i] -= conifer
+        s.deciduous_biomass[i] -= deciduous
+        s.soil_carbon[i] += conifer + deciduous
+        r.litterfall_kgc_m2[i] += conifer + deciduous
+
+
+@compiled
+def move_carbon(b, seconds):
+    """Photosynthesis and respiration, moved between air, trees and soil."""
+    s, p, w, r = b.s, b.p, b.w, b.r
+    for i in range(len(s.swe)):
+        before = s.conifer_biomass[i] + s.deciduous_biomass[i] + s.soil_carbon[i]
+        warmth = q10_factor(w.air[i], p.respiration_reference_c[i], w.log_q10[i])
+        conifer = warmth * (w.leaf_rate[i] * w.lai_conifer[i] + w.wood_rate[i] * s.conifer_biomass[i])
+        deciduous = warmth * (w.leaf_rate[i] * w.lai_deciduous[i] + w.wood_rate[i] * s.deciduous_biomass[i])
+        conifer = autotrophic(w.gpp_conifer[i], conifer, p.growth_respiration[i], s.conifer_biomass[i], seconds)
+        deciduous = autotrophic(w.gpp_deciduous[i], deciduous, p.growth_respiration[i], s.deciduous_biomass[i], seconds)
+        warmth = q10_factor(w.soil_top[i], p.respiration_reference_c[i], w.log_q10[i])
+        soil = min(warmth * w.soil_rate[i] * seconds, 1.0) * s.soil_carbon[i]
+        s.conifer_biomass[i] += w.gpp_conifer[i] * seconds - conifer
+        s.deciduous_biomass[i] += w.gpp_deciduous[i] * seconds - deciduous
+        s.soil_carbon[i] -= soil
+        gross = (w.gpp_conifer[i] + w.gpp_deciduous[i]) * seconds
+        after = s.conifer_biomass[i] + s.deciduous_biomass[i] + s.soil_carbon[i]
+        failure = abs(after - before - (gross - conifer - deciduous - soil))
+        r.carbon_residual_kgc_m2[i] = max(r.carbon_residual_kgc_m2[i], failure)
+        r.gpp_kgc_m2[i] += gross
+        r.autotrophic_respiration_kgc_m2[i] += conifer + deciduous
+        r.heterotrophic_respiration_kgc_m2[i] += soil
+
+
+@compiled
+def decay_products(b, i):
+    """A year's loss of wood products, if they have a half-life."""
+    s, w, r = b.s, b.w, b.r
+    lost = s.products[i] * w.products_decay[i]
+    s.products[i] -= lost
+    r.hwp_decay_kgc_m2[i] = lost

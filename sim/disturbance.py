@@ -1,7 +1,8 @@
 """Fire and insects: their hazards, and what they do to a stand. Their dice are drawn before the year begins."""
 
-from sim.demography import OLDEST, count, kill, remove_share
+from sim.demography import count_stand, fell, kill
 from sim.jit import compiled, phase
+from sim.mathematics import between
 from sim.structure import crown_areas
 from sim.weather import drought_index
 
@@ -19,12 +20,6 @@ def fire_weather(drought, temperature, threshold, temperature_threshold) -> bool
 
 
 @compiled
-def between(low, high, uniform) -> float:
-    """Even draw between two values."""
-    return low + (high - low) * uniform
-
-
-@compiled
 def outbreak_probability(base, winter_temperature, density, lethal, mild, reference_density) -> float:
     """Yearly probability of an insect outbreak: grows with a mild winter (overwintering) and with density."""
     survival = min(max((winter_temperature - lethal) / (mild - lethal), 0.0), 1.0)
@@ -32,13 +27,28 @@ def outbreak_probability(base, winter_temperature, density, lethal, mild, refere
 
 
 @phase
-def fire(b, day, i):
+def fire(b, day):
     """Drought index of the day, and a fire if dice, drought and warmth agree; at most one a year."""
-    s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
+    for i in range(len(b.s.swe)):
+        dry(b, i)
+        if ignites(b, day, i):
+            burn(b, i)
+
+
+@compiled
+def dry(b, i):
+    """Drought index of the day."""
+    s, p, w, r = b.s, b.p, b.w, b.r
     s.drought[i] = drought_index(
         s.drought[i], w.mean_temperature[i], w.precipitation[i], s.swe[i], p.drought_evaporation[i]
     )
     r.drought_index[i] = max(r.drought_index[i], s.drought[i])
+
+
+@compiled
+def ignites(b, day, i) -> bool:
+    """Whether a fire starts in a lane's stand, which has not burned this year."""
+    s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
     hazard = fire_hazard(
         p.fire_base_probability[i],
         w.cover_conifer[i],
@@ -48,16 +58,18 @@ def fire(b, day, i):
     )
     summer = p.summer_start_day[i] <= day + 1 < p.summer_end_day[i]
     ready = fire_weather(s.drought[i], w.mean_temperature[i], p.fire_drought_threshold[i], p.fire_temperature_c[i])
-    if not (summer and ready and p.fire[i] > 0.0 and r.fire_mortality[i] == 0.0 and d.fire_dice[day, i] < hazard):
-        return
+    return summer and ready and p.fire[i] > 0.0 and r.fire_mortality[i] == 0.0 and d.fire_dice[day, i] < hazard
+
+
+@phase
+def burn(b, i):
+    """A fire: trees and organic layer burn in part, and what does not burn goes to the soil."""
+    s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
     killed = between(p.fire_kill_low[i], p.fire_kill_high[i], d.fire_kill[i])
-    w.stems_gain[i] -= killed * (count(s.conifer_stems, i, 0, OLDEST) + count(s.deciduous_stems, i, 0, OLDEST))
-    remove_share(s.conifer_stems, i, 0, OLDEST, killed)
-    remove_share(s.deciduous_stems, i, 0, OLDEST, killed)
-    conifer, deciduous = killed * s.conifer_biomass[i], killed * s.deciduous_biomass[i]
+    conifers, deciduous = count_stand(b, i)
+    w.stems_gain[i] -= killed * (conifers + deciduous)
+    conifer, deciduous = fell(b, i, killed, killed)
     burned = p.fire_combusted_conifer[i] * conifer + p.fire_combusted_deciduous[i] * deciduous
-    s.conifer_biomass[i] -= conifer
-    s.deciduous_biomass[i] -= deciduous
     share = between(p.fire_organic_low[i], p.fire_organic_high[i], d.fire_depth[i])
     depth = share * s.organic_depth[i]
     soil = min(depth * p.organic_carbon_density[i], share * s.soil_carbon[i])
@@ -72,8 +84,9 @@ def fire(b, day, i):
 @phase
 def insects(b, i):
     """An outbreak, if dice, the past winter and density agree; the dead go to the soil."""
-    s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
-    density = count(s.conifer_stems, i, 0, OLDEST) + count(s.deciduous_stems, i, 0, OLDEST)
+    p, w, r, d = b.p, b.w, b.r, b.d
+    conifers, deciduous = count_stand(b, i)
+    density = conifers + deciduous
     winter = w.winter_air[i] / w.winter_days[i] if w.winter_days[i] > 0.0 else 0.0
     probability = outbreak_probability(
         p.insect_base_probability[i], winter, density, p.insect_lethal_c[i], p.insect_mild_c[i], p.insect_density[i]
@@ -82,9 +95,3 @@ def insects(b, i):
         return
     killed = kill(b, i, p.insect_mortality_rate[i], p.insect_deciduous[i] * p.insect_mortality_rate[i])
     r.insect_mortality[i] = killed / density if density > 0.0 else 0.0
-
-
-@phase
-def disturb(b, i):
-    """The disturbances of a year's end, one after the other."""
-    insects(b, i)

@@ -24,10 +24,10 @@ def episode_seeds(seed: int) -> Seeds:
 
 def draw_year(weather, disturbance) -> np.ndarray:
     """A year's random numbers in the order of `sim.state.DRAWS`: always as many, whatever the stand does."""
-    weather_names = ("temperature_noise", "wet_dice", "wet_amount")
+    streams = {"weather": weather, "disturbance": disturbance}
     values = []
-    for name, (daily, distribution) in DRAWS.items():
-        generator = weather if name in weather_names else disturbance
+    for daily, distribution, stream in DRAWS.values():
+        generator = streams[stream]
         size = DAYS if daily else 1
         if distribution == "normal":
             values.append(generator.standard_normal(size))
@@ -41,7 +41,7 @@ def draw_year(weather, disturbance) -> np.ndarray:
 def draw_slice(wanted: str) -> slice:
     """Where a draw stands in what `draw_year` returns."""
     first = 0
-    for name, (daily, _) in DRAWS.items():
+    for name, (daily, *_) in DRAWS.items():
         size = DAYS if daily else 1
         if name == wanted:
             return slice(first, first + size)

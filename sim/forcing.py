@@ -1,25 +1,55 @@
-"""The day's weather, generated from the site's climate or observed, and the sun."""
+"""The sun and the weather of a day and of its steps, generated from the site's climate or observed."""
 
 import math
 
-from sim.jit import phase
+import numpy as np
+
+from sim.jit import compiled, phase
+from sim.physical_constants import DAYS_PER_YEAR, FREEZING_POINT_K, SECONDS_PER_DAY, SOLAR_CONSTANT
+from sim.radiation import black_body
 from sim.weather import (
-    DAYS_PER_YEAR,
-    FREEZING_POINT_K,
-    SOLAR_CONSTANT,
+    air_density,
+    cos_zenith,
     daily_mean_temperature,
     daily_precipitation,
     diffuse_share,
     diurnal_amplitude,
+    hour_angle,
     of_season,
     precipitation_season,
+    saturation_pressure,
     saturation_pressure_water,
+    saturation_slope,
     sky_emissivity,
+    snow_share,
     solar_declination,
     solar_distance_factor,
 )
+from sim.wind import wind_exchange
 
 WET_DAY_MM = 1.0
+
+
+@compiled
+def site_angles(b, i):
+    """Latitude, warmest day and warmest hour as angles, for the year."""
+    p, w = b.p, b.w
+    latitude = math.radians(p.latitude_deg[i])
+    w.cos_latitude[i], w.sin_latitude[i] = math.cos(latitude), math.sin(latitude)
+    warmest = 2.0 * math.pi * p.warmest_day[i] / DAYS_PER_YEAR
+    w.cos_warmest[i], w.sin_warmest[i] = math.cos(warmest), math.sin(warmest)
+    peak = 2.0 * math.pi * p.peak_diurnal_hour[i] / 24.0
+    w.cos_peak[i], w.sin_peak[i] = math.cos(peak), math.sin(peak)
+
+
+@phase
+def hour_angles(steps_per_day):
+    """Cosine and sine of the hour angle at the middle of each step of a day, shape (steps, 2)."""
+    hours = np.empty((steps_per_day, 2))
+    for t in range(steps_per_day):
+        angle = hour_angle(t, steps_per_day)
+        hours[t, 0], hours[t, 1] = math.cos(angle), math.sin(angle)
+    return hours
 
 
 @phase
@@ -121,7 +151,7 @@ def generated_weather(b, day):
         w.top_of_canopy[i] = clearness * w.extraterrestrial[i]
         w.diffuse[i] = diffuse_share(clearness)
 
-        noon = min(max(w.sun_a[i] + w.sun_b[i], 0.0) / p.diurnal_full_sun[i], 1.0)
+        noon = min(cos_zenith(w.sun_a[i], w.sun_b[i], 1.0) / p.diurnal_full_sun[i], 1.0)
         w.amplitude[i] = diurnal_amplitude(
             p.diurnal_amplitude_c[i],
             precipitation,
@@ -134,7 +164,7 @@ def generated_weather(b, day):
         w.mean_temperature[i] = temperature
         w.minimum_temperature[i] = temperature - w.amplitude[i]
         w.precipitation[i] = precipitation
-        w.air_density[i] = 100.0 * p.air_pressure_hpa[i] / (287.05 * (temperature + FREEZING_POINT_K))
+        w.air_density[i] = air_density(p.air_pressure_hpa[i], temperature)
 
 
 @phase
@@ -149,10 +179,64 @@ def observed_weather(b, observed):
             minimum = min(minimum, observed[t, 0, i])
             precipitation += observed[t, 5, i]
             received += observed[t, 3, i]
-            hour_angle = 2.0 * math.pi * ((t + 0.5) / steps - 0.5)
-            possible += w.extraterrestrial[i] * max(w.sun_a[i] + w.sun_b[i] * math.cos(hour_angle), 0.0)
+            possible += w.extraterrestrial[i] * cos_zenith(w.sun_a[i], w.sun_b[i], math.cos(hour_angle(t, steps)))
         w.mean_temperature[i] = mean
         w.minimum_temperature[i] = minimum
         w.precipitation[i] = precipitation
         w.diffuse[i] = diffuse_share(min(received / possible, 1.0)) if possible > 0.0 else 1.0
-        w.air_density[i] = 100.0 * p.air_pressure_hpa[i] / (287.05 * (mean + FREEZING_POINT_K))
+        w.air_density[i] = air_density(p.air_pressure_hpa[i], mean)
+
+
+@compiled
+def step_weather(b, t, hours, seconds, observed):
+    """Weather of a step. It is apart from the step because it alone takes arrays, whose references are counted.
+
+    t : number of the step in its day; hours : cosine and sine of the hour angle at the middle of each step of a day,
+    shape (steps, 2); observed : the day's forcing (steps, 6, lanes), or (0, 6, lanes) for none.
+    """
+    if observed.shape[0] > 0:
+        observed_air(b, observed[t], hours[t, 0])
+    else:
+        generated_air(b, hours[t, 0], hours[t, 1], seconds)
+
+
+@compiled
+def generated_air(b, cos_hour, sin_hour, seconds):
+    """Sun, air temperature, longwave and precipitation of the step, from the day's generated weather."""
+    w = b.w
+    for i in range(len(b.s.swe)):
+        w.cos_zenith[i] = cos_zenith(w.sun_a[i], w.sun_b[i], cos_hour)
+        w.shortwave[i] = w.top_of_canopy[i] * w.cos_zenith[i]
+        w.air[i] = w.mean_temperature[i] + w.amplitude[i] * (cos_hour * w.cos_peak[i] + sin_hour * w.sin_peak[i])
+        w.air_emission[i] = black_body(w.air[i] + FREEZING_POINT_K)
+        w.sky[i] = w.emissivity[i] * w.air_emission[i]
+        w.precipitation_step[i] = w.precipitation[i] * (seconds / SECONDS_PER_DAY)
+
+
+@compiled
+def observed_air(b, row, cos_hour):
+    """The same from observation; row : (6, lanes), columns as in `sim.state.FORCING`."""
+    w = b.w
+    for i in range(len(b.s.swe)):
+        w.cos_zenith[i] = cos_zenith(w.sun_a[i], w.sun_b[i], cos_hour)
+        w.shortwave[i] = row[3, i]
+        w.air[i] = row[0, i]
+        w.vapour[i] = row[1, i] * saturation_pressure_water(row[0, i])
+        w.air_emission[i] = black_body(row[0, i] + FREEZING_POINT_K)
+        w.sky[i] = row[4, i]
+        w.precipitation_step[i] = row[5, i]
+        wind_exchange(b, i, row[2, i])
+
+
+@compiled
+def moisture(b):
+    """Humidity of the step's air, and its precipitation as rain and snow."""
+    w = b.w
+    for i in range(len(b.s.swe)):
+        saturation = saturation_pressure(w.air[i])
+        w.saturation_slope[i] = saturation_slope(w.air[i], saturation)
+        # The vapour of the day's mean is more than a cold night's air can hold: the rest is dew and fog, not followed.
+        w.humidity[i] = min(w.vapour[i], saturation)
+        w.deficit[i] = saturation - w.humidity[i]
+        w.snow[i] = w.precipitation_step[i] * snow_share(w.air[i])
+        w.rain[i] = w.precipitation_step[i] - w.snow[i]

@@ -7,8 +7,8 @@ the share that it leaves undone, `missed_share` (`sim.task.objectives`).
 
 import numpy as np
 
-from sim.demography import AGE_CLASSES, OLDEST, SAPLING_LIMIT, count, remove_share, total_weight
-from sim.jit import compiled
+from sim.demography import AGE_CLASSES, OLDEST, class_ages, count, count_stand, first_ages, remove_share, total_weight
+from sim.jit import compiled, phase
 
 DENSITY_CHANGES = (-100.0, -50.0, 0.0, 50.0, 100.0)  # stems ha-1
 CONIFER_MIXES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -45,13 +45,9 @@ def check_actions(actions, number) -> np.ndarray:
 
 def first_cut_age(harvest_min_class: str, constants: dict) -> int:
     """Youngest age that thinning may cut, from the name of its age class."""
-    ages = {
-        "young": SAPLING_LIMIT + 1,
-        "mature": int(constants["young_age_limit"]) + 1,
-        "old": int(constants["mature_age_limit"]) + 1,
-    }
+    ages = dict(zip(AGE_CLASSES[2:], first_ages(constants)[2:], strict=False))
     if not isinstance(harvest_min_class, str) or harvest_min_class not in ages:
-        raise ValueError(f"harvest_min_class {harvest_min_class!r}: allowed are {', '.join(AGE_CLASSES[2:])}")
+        raise ValueError(f"harvest_min_class {harvest_min_class!r}: allowed are {', '.join(ages)}")
     return ages[harvest_min_class]
 
 
@@ -77,16 +73,16 @@ def conifers_to_cut(cut, mix, conifers, deciduous, harvestable_conifers, harvest
 
 
 @compiled
-def cut_oldest(stems, lane, cut, first_age, young_limit, mature_limit, rate, shape, exponent) -> float:
+def cut_oldest(stems, lane, cut, first_age, ages, rate, shape, exponent) -> float:
     """Cut stems of one species, oldest class first, in place; returns the share of the species' carbon cut.
 
-    first_age : the youngest age that may be cut; young_limit, mature_limit : last ages of those classes.
+    first_age : the youngest age that may be cut; ages : first ages of the classes, `sim.demography.class_ages`.
     """
     whole = total_weight(stems, lane, 0, OLDEST, rate, shape, exponent)
     removed = 0.0
     left = cut
     oldest = OLDEST
-    for youngest in (mature_limit + 1, young_limit + 1, first_age):
+    for youngest in (ages[4], ages[3], first_age):
         youngest = max(youngest, first_age)
         available = count(stems, lane, youngest, oldest) if youngest <= oldest else 0.0
         if left > 0.0 and available > 0.0:
@@ -96,3 +92,79 @@ def cut_oldest(stems, lane, cut, first_age, young_limit, mature_limit, rate, sha
             left -= share * available
         oldest = youngest - 1
     return min(removed / whole, 1.0) if whole > 0.0 else 0.0
+
+
+@phase
+def manage(b, i):
+    """Plant or thin: seedlings of the wanted mix; or the oldest stems, so that the stand nears the mix."""
+    w, r = b.w, b.r
+    conifers, deciduous = count_stand(b, i)
+    first_age = int(w.first_cut_age[i])
+    harvestable_conifers = count(b.s.conifer_stems, i, first_age, OLDEST)
+    harvestable_deciduous = count(b.s.deciduous_stems, i, first_age, OLDEST)
+    r.harvestable_stems_ha[i] = harvestable_conifers + harvestable_deciduous
+    change = feasible_change(w.density_change[i], conifers + deciduous, r.harvestable_stems_ha[i])
+    if change > 0.0:
+        plant(b, i, change)
+    elif change < 0.0:
+        cut = -change
+        cut_conifers = conifers_to_cut(cut, w.mix[i], conifers, deciduous, harvestable_conifers, harvestable_deciduous)
+        thin(b, i, cut_conifers, cut - cut_conifers)
+        r.thinned_stems_ha[i] = cut
+    w.stems_gain[i] += change
+    conifers, deciduous = count_stand(b, i)
+    density = conifers + deciduous
+    r.density_after_action[i] = density
+    r.conifer_fraction_after_action[i] = conifers / density if density > 0.0 else 0.0
+    if density <= 0.0:
+        bury(b, i)
+
+
+@compiled
+def plant(b, i, stems):
+    """Plant seedlings of the wanted mix [stems ha-1]."""
+    s, w = b.s, b.w
+    s.conifer_stems[0, i] += stems * w.mix[i]
+    s.deciduous_stems[0, i] += stems * (1.0 - w.mix[i])
+    b.r.planted_stems_ha[i] = stems
+
+
+@phase
+def thin(b, i, conifers, deciduous):
+    """Cut so many stems of each species [ha-1]; a part of their carbon is stored in products, the rest lost."""
+    s, p, w, r = b.s, b.p, b.w, b.r
+    first_age = int(w.first_cut_age[i])
+    ages = class_ages(int(p.young_age_limit[i]), int(p.mature_age_limit[i]))
+    exponent = p.stem_carbon_exponent[i]
+    share_conifer = cut_oldest(
+        s.conifer_stems, i, conifers, first_age, ages, p.height_rate_conifer[i], p.height_shape_conifer[i], exponent
+    )
+    share_deciduous = cut_oldest(
+        s.deciduous_stems,
+        i,
+        deciduous,
+        first_age,
+        ages,
+        p.height_rate_deciduous[i],
+        p.height_shape_deciduous[i],
+        exponent,
+    )
+    harvest = share_conifer * s.conifer_biomass[i] + share_deciduous * s.deciduous_biomass[i]
+    s.conifer_biomass[i] -= share_conifer * s.conifer_biomass[i]
+    s.deciduous_biomass[i] -= share_deciduous * s.deciduous_biomass[i]
+    stored = p.harvest_stored_share[i] * harvest
+    s.products[i] += stored
+    r.harvest_kgc_m2[i] = harvest
+    r.hwp_stored_kgc_m2[i] = stored
+    r.harvest_emission_kgc_m2[i] = harvest - stored
+
+
+@compiled
+def bury(b, i):
+    """Without stems nothing lives: what biomass there was is litter."""
+    s = b.s
+    dead = s.conifer_biomass[i] + s.deciduous_biomass[i]
+    s.conifer_biomass[i] = 0.0
+    s.deciduous_biomass[i] = 0.0
+    s.soil_carbon[i] += dead
+    b.r.mortality_kgc_m2[i] += dead

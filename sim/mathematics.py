@@ -1,4 +1,4 @@
-"""Exponential and the power 2/3 in plain arithmetic.
+"""Exponential, the power 2/3 and interpolation in plain arithmetic.
 
 libm's functions are calls that stop the compiler from treating eight stands at a time; plain arithmetic does not, and
 it gives the same bits for one stand as for sixteen.
@@ -40,3 +40,9 @@ def two_thirds_power(x: float) -> float:
         e = 1.0 - x * inverse * inverse * inverse
         inverse += inverse * e * (1.0 / 3.0 + e * (2.0 / 9.0 + e * (14.0 / 81.0 + e * (35.0 / 243.0))))
     return x * inverse
+
+
+@compiled
+def between(low, high, share) -> float:
+    """The value at a share of the way from `low` to `high`."""
+    return low + (high - low) * share

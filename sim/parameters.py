@@ -1,8 +1,8 @@
 """The two parameter tables, sampling of sites, and the checks of user-given values.
 
-`site_parameters.csv`: the 62 parameters that differ between sites, with the range they are sampled from.
-`constants.csv`: literature constants, one value each. Both have physical limits, a unit and a source, and both
-are passed to the compiled physics at run time: changing one recompiles nothing.
+`site_parameters.csv`: the parameters that differ between sites, with the range they are sampled from, and whether an
+observation of the site shows them. `constants.csv`: literature constants, one value each. Both have physical limits, a
+unit and a source, and both are passed to the compiled physics at run time: changing one recompiles nothing.
 """
 
 import csv
@@ -18,7 +18,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Parameter:
-    """One row of a parameter table; `low == high` for a constant."""
+    """One row of a parameter table; `low == high` for a constant, which is not observed."""
 
     name: str
     low: float
@@ -29,6 +29,7 @@ class Parameter:
     group: str
     source: str
     description: str
+    observed: bool = False
 
 
 def _read(table: str) -> dict[str, Parameter]:
@@ -39,12 +40,18 @@ def _read(table: str) -> dict[str, Parameter]:
             if value is not None:
                 row["low"] = row["high"] = value
             numbers = {k: float(row[k]) for k in ("low", "high", "physical_low", "physical_high")}
-            parameters[row["name"]] = Parameter(**{**row, **numbers})
+            observed = row.pop("observed", "no")
+            if observed not in ("yes", "no"):
+                raise ValueError(f"{table}: {row['name']} has observed {observed!r}; yes and no are allowed")
+            parameters[row["name"]] = Parameter(**{**row, **numbers, "observed": observed == "yes"})
     return parameters
 
 
 SITE_PARAMETERS = _read("site_parameters.csv")
 CONSTANTS = _read("constants.csv")
+
+#: Names of the site parameters that are observed, in the order of the table.
+OBSERVED_SITE_PARAMETERS = tuple(name for name, parameter in SITE_PARAMETERS.items() if parameter.observed)
 
 #: Mechanisms that can be switched off, to run the paper's bare five nodes or to measure what each one does.
 MECHANISMS = {
@@ -94,14 +101,16 @@ def mean_annual_temperature(latitude_deg: float, uniform: float) -> float:
 
 
 def sample_site(site_seed: int, overrides: dict | None = None) -> dict[str, float]:
-    """The 62 parameters of the site with this seed, in the order of `site_parameters.csv`.
+    """The parameters of the site with this seed, in the order of `site_parameters.csv`.
 
-    All 62 are always drawn, so that an override (a value, or a (low, high) range to draw from) changes nothing
-    else. Raises ValueError for an unknown name or a value outside physical limits.
+    All are always drawn, so that an override (a value, or a (low, high) range to draw from) changes nothing else; those
+    that are not observed after the others, so that a new one changes no site. Raises ValueError for an unknown name or
+    a value outside physical limits.
     """
     overrides = check_overrides(overrides)
     generator = np.random.default_rng(check_seed("site_seed", site_seed))
-    uniforms = {name: generator.random() for name in SITE_PARAMETERS}
+    observed_first = sorted(SITE_PARAMETERS, key=lambda name: not SITE_PARAMETERS[name].observed)
+    uniforms = {name: generator.random() for name in observed_first}
     site = {}
     for name, parameter in SITE_PARAMETERS.items():
         low, high = overrides.get(name, (parameter.low, parameter.high))
@@ -126,8 +135,12 @@ def middle_site(overrides: dict | None = None) -> dict[str, float]:
 
 
 def scale_site(site: dict[str, float]) -> np.ndarray:
-    """The 62 parameters as shares of their sampled ranges: 0 at the low end, 1 at the high end. Shape (62,)."""
-    return np.array([(site[name] - p.low) / (p.high - p.low) for name, p in SITE_PARAMETERS.items()])
+    """The observed parameters as shares of their sampled ranges: 0 at the low end, 1 at the high end.
+
+    Shape (number of `OBSERVED_SITE_PARAMETERS`,).
+    """
+    observed = ((site[name], SITE_PARAMETERS[name]) for name in OBSERVED_SITE_PARAMETERS)
+    return np.array([(value - p.low) / (p.high - p.low) for value, p in observed])
 
 
 def check_overrides(overrides: dict | None) -> dict[str, tuple[float, float]]:

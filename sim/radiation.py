@@ -5,7 +5,7 @@ Fluxes in W m-2 of ground area, transmissivities and albedos as shares.
 
 from sim.jit import compiled
 from sim.mathematics import exponential
-from sim.weather import STEFAN_BOLTZMANN
+from sim.physical_constants import STEFAN_BOLTZMANN
 
 
 @compiled

@@ -8,7 +8,7 @@ from sim.management import check_actions
 from sim.parameters import middle_site
 from sim.spin_up import check_initial
 from sim.stands import Stands
-from sim.state import DAILY, DAYS, FORCING, RECORD_NAMES
+from sim.state import DAILY_NAMES, DAYS, FORCING, RECORD_NAMES
 
 #: Allowed values of an observed forcing: column -> (low, high, unit, hint).
 FORCING_LIMITS = {
@@ -42,7 +42,7 @@ def simulate(
     Parameters
     ----------
     site : dict of site parameters that differ from the middle of their ranges (any value inside the physical
-        limits of `sim/site_parameters.csv`), or None. All 62, as `sim.sample_site` returns them, are a site too.
+        limits of `sim/site_parameters.csv`), or None. All of them, as `sim.sample_site` returns them, are a site too.
     actions : integer in [0, 25) for every year, or a sequence with one a year; 12 changes nothing.
     seed : of first state, weather and disturbances.
     years : years to run.
@@ -92,7 +92,7 @@ def simulate(
         if output == "annual":
             table = pd.DataFrame(record, columns=RECORD_NAMES)
         else:
-            table = pd.DataFrame(daily[0], columns=DAILY)
+            table = pd.DataFrame(daily[0], columns=DAILY_NAMES)
             table.insert(0, "doy", np.arange(1, days + 1))
         table.insert(0, "year", year)
         tables.append(table)

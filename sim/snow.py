@@ -1,18 +1,10 @@
 """Snow on the ground: albedo, insulation, exchange with the air. The snow node is the snow's surface; its whole
 depth lies between it and the soil. Without snow the node is the ground's skin of moss and litter."""
 
-import math
+from sim.jit import compiled, phase
+from sim.physical_constants import ICE_HEAT_CAPACITY, SECONDS_PER_HOUR
 
-from sim.jit import compiled
-from sim.weather import FREEZING_POINT_K
-
-ICE_HEAT_CAPACITY = 2100.0  # J kg-1 K-1
-LATENT_HEAT_FUSION = 3.34e5  # J kg-1
-LATENT_HEAT_VAPORISATION = 2.5e6  # J kg-1
-LATENT_HEAT_SUBLIMATION = LATENT_HEAT_FUSION + LATENT_HEAT_VAPORISATION
-AIR_HEAT_CAPACITY = 1005.0  # J kg-1 K-1
-GRAVITY = 9.81  # m s-2
-VON_KARMAN = 0.4
+SNOW_DAY_MM = 1.0  # of snow, less than which is none to a day's wind and to the record
 MELTING_FROM_C = -0.01  # a melting pack is at 0 degC only to rounding
 
 
@@ -39,9 +31,9 @@ def snow_albedo(albedo, temperature, snowfall, fresh, cold, old, cold_hours, mel
     hours = melt_hours if melting else cold_hours
     limit = old if melting else min(albedo, cold)
     # Weights of the old albedo, of the limit and of fresh snow; all times `refresh` x the time, for a single division.
-    staying = 3600.0 * hours * refresh
+    staying = SECONDS_PER_HOUR * hours * refresh
     ageing = seconds * refresh
-    renewal = snowfall * (3600.0 * hours)
+    renewal = snowfall * (SECONDS_PER_HOUR * hours)
     return (staying * albedo + ageing * limit + renewal * fresh) / (staying + ageing + renewal)
 
 
@@ -53,19 +45,41 @@ def surface_albedo(swe, hidden_per_mm, snow, ground) -> float:
 
 
 @compiled
-def ground_profile(wind_height, height, roughness, thermal_ratio) -> tuple[float, float]:
-    """Logarithmic profile over the ground: exchange velocity per wind speed at `wind_height`, and that wind's share at
-    `height`, where air temperature holds (FSM2). Heat has `thermal_ratio` of the roughness length of momentum."""
-    aloft = math.log(wind_height / roughness)
-    exchange = VON_KARMAN * VON_KARMAN / (aloft * math.log(height / (thermal_ratio * roughness)))
-    return exchange, math.log(height / roughness) / aloft
+def ground_capacity(swe, skin) -> float:
+    """Heat capacity [J m-2 K-1] of the ground's node: its snow and its skin."""
+    return ICE_HEAT_CAPACITY * swe + skin
+
+
+@phase
+def snow_properties(b):
+    """Density of the day's snow, its resistance to heat, and how much of it hides the ground."""
+    p, w = b.p, b.w
+    for i in range(len(b.s.swe)):
+        crowns = w.cover_conifer[i] + w.cover_deciduous[i]
+        w.snow_density[i] = bulk_density(crowns, p.snow_density_sheltered[i], p.snow_density_open[i])
+        w.snow_resistance[i] = 1.0 / (w.snow_density[i] * conductivity(w.snow_density[i]))
+        w.snow_hiding[i] = 1.0 / (w.snow_density[i] * p.snow_cover_depth_m[i])
 
 
 @compiled
-def stability(surface, air, wind_below, height, damping, limit) -> float:
-    """Factor on turbulent exchange: 1 / (1 + 10 Ri) over a cold surface (Price and Dunne 1976), and its counterpart
-    sqrt(1 + 10 |Ri|), limited, over a warm one. wind_below : at `height`."""
-    shear = (air + FREEZING_POINT_K) * max(wind_below * wind_below, 1e-6)
-    buoyancy = damping * GRAVITY * height * (air - surface)  # 10 Ri is their ratio
-    factor = (shear + max(-buoyancy, 0.0)) / (shear + max(buoyancy, 0.0))
-    return factor if buoyancy > 0.0 else min(math.sqrt(factor), limit)
+def lay_snow(b, i, ground_snow, seconds):
+    """Add snow [mm] to a lane's ground; it is as cold as the air, and the heat it brings is the heat its mass gains."""
+    s, p, w = b.s, b.p, b.w
+    w.advected[i] = ICE_HEAT_CAPACITY * ground_snow * min(w.air[i], 0.0)
+    heat = ground_capacity(s.swe[i], p.skin_heat_capacity[i]) * s.ground[i] + w.advected[i]
+    s.swe[i] += ground_snow
+    mixed = heat / ground_capacity(s.swe[i], p.skin_heat_capacity[i])
+    s.ground[i] = mixed if ground_snow > 0.0 else s.ground[i]
+    aged = snow_albedo(
+        s.albedo[i],
+        s.ground[i],
+        ground_snow,
+        p.snow_albedo_fresh[i],
+        p.snow_albedo_cold[i],
+        p.snow_albedo_old[i],
+        p.snow_albedo_cold_hours[i],
+        p.snow_albedo_melt_hours[i],
+        p.snow_albedo_refresh_mm[i],
+        seconds,
+    )
+    s.albedo[i] = aged if s.swe[i] > 0.0 else p.snow_albedo_fresh[i]

@@ -8,6 +8,30 @@ compiler makes one division of them all.
 import math
 
 from sim.jit import compiled
+from sim.physical_constants import FREEZING_POINT_K, LATENT_HEAT_FUSION, WATER_DENSITY
+
+
+@compiled
+def where_it_freezes(freezes, thawed, frozen) -> float:
+    """A property of frozen soil: the thawed soil's where freezing is switched off (`freezes` 0)."""
+    return thawed + freezes * (frozen - thawed)
+
+
+@compiled
+def node_capacities(freezes, surface_depth, deep_node, boundary_depth, thawed, frozen, freezing_water):
+    """Heat capacities thawed and frozen [J m-2 K-1] and latent heat [J m-2] of the surface node and of the deep node.
+
+    freezes : 1, or 0 where freezing is switched off; thawed, frozen : heat capacities [J m-3 K-1];
+    freezing_water : share of the soil's volume.
+    """
+    frozen = where_it_freezes(freezes, thawed, frozen)
+    latent = freezes * LATENT_HEAT_FUSION * WATER_DENSITY * freezing_water
+    deep_depth = boundary_depth - surface_depth
+    # Far below its node the deep soil has nearly the boundary's temperature, and stays frozen or thawed.
+    freezing_depth = min(deep_depth, 2.0 * (deep_node - surface_depth))
+    surface = thawed * surface_depth, frozen * surface_depth, latent * surface_depth
+    deep = thawed * deep_depth, frozen * deep_depth, latent * freezing_depth
+    return surface, deep
 
 
 @compiled
@@ -66,90 +90,6 @@ def organic_layer(depth, conifer, deciduous, depth_conifer, depth_deciduous, dep
 
 
 @compiled
-def respond_to_canopy(
-    trunk,
-    trunk_inertia,
-    trunk_canopy,
-    trunk_air,
-    trunk_ground,
-    ground,
-    ground_inertia,
-    ground_air,
-    ground_source,
-    ground_emission,
-    ground_emission_slope,
-    vapour_slope,
-    ground_emissivity,
-    cover,
-    air,
-    surface,
-    surface_inertia,
-    ground_surface,
-    deep,
-    deep_inertia,
-    surface_deep,
-    deep_boundary,
-    boundary,
-):
-    """Answer of trunk, ground and soil to the canopy within an implicit step, from the bottom up.
-
-    Temperatures in degC at the start of the step, inertias (heat capacity / time step) and conductances in
-    W m-2 K-1. Every node's balance is linear (the ground's emission about its old temperature), so each is a line
-    in the temperature of the node above it; what remains is the canopy's own equation.
-    Returns the coefficients (deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base,
-    trunk_by_canopy, trunk_by_ground, ground_base, ground_by_emission, ground_by_canopy), the ground's stiffness
-    [W m-2 K-1] and its inverse, `yielding`.
-    """
-    yielding = 1.0 / (deep_inertia + deep_boundary + surface_deep)
-    deep_base = (deep_inertia * deep + deep_boundary * boundary) * yielding
-    deep_by_surface = surface_deep * yielding
-
-    yielding = 1.0 / (surface_inertia + ground_surface + surface_deep * (1.0 - deep_by_surface))
-    surface_base = (surface_inertia * surface + surface_deep * deep_base) * yielding
-    surface_by_ground = ground_surface * yielding
-
-    yielding = 1.0 / (trunk_inertia + trunk_canopy + trunk_air + trunk_ground)
-    trunk_base = (trunk_inertia * trunk + trunk_air * air) * yielding
-    trunk_by_canopy = trunk_canopy * yielding
-    trunk_by_ground = trunk_ground * yielding
-
-    # Here too what is known last is added last (see `sim.canopy.canopy_balance`).
-    stiffness = (
-        ground_inertia
-        + ground_emissivity * ground_emission_slope
-        + trunk_ground * (1.0 - trunk_by_ground)
-        + ground_air
-        + vapour_slope
-        + ground_surface * (1.0 - surface_by_ground)
-    )
-    yielding = 1.0 / stiffness
-    ground_base = (
-        ground_inertia * ground
-        - ground_emissivity * (ground_emission - ground_emission_slope * ground)
-        + trunk_ground * trunk_base
-        + (ground_air * air + vapour_slope * ground)
-        + ground_source
-        + ground_surface * surface_base
-    ) * yielding
-    ground_by_emission = ground_emissivity * cover * yielding
-    ground_by_canopy = trunk_ground * trunk_by_canopy * yielding
-    return (
-        deep_base,
-        deep_by_surface,
-        surface_base,
-        surface_by_ground,
-        trunk_base,
-        trunk_by_canopy,
-        trunk_by_ground,
-        ground_base,
-        ground_by_emission,
-        ground_by_canopy,
-        stiffness,
-        yielding,
-    )
-
-
-@compiled
 def thaw_depth(
     organic,
     warmth,
@@ -183,3 +123,96 @@ def thaw_depth(
     square = linear * linear + 2.0 * heat * (thawed_conductivity * warmth - above * cold)
     front = (math.sqrt(max(square, 0.0)) - linear) / heat if heat > 0.0 else 0.0
     return organic + min(max(front, 0.0), boundary_depth)
+
+
+@compiled
+def soil_nodes(b, i):
+    """Capacities and distances of the two nodes, for the year."""
+    p, w = b.p, b.w
+    surface, deep = node_capacities(
+        p.soil_freezing[i],
+        p.surface_soil_depth_m[i],
+        p.deep_soil_node_m[i],
+        p.boundary_depth_m[i],
+        p.soil_heat_capacity_thawed[i],
+        p.soil_heat_capacity_frozen[i],
+        p.soil_freezing_water[i],
+    )
+    w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i] = surface
+    w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i] = deep
+    w.frozen_ratio[i] = where_it_freezes(p.soil_freezing[i], 1.0, p.soil_frozen_conductivity_ratio[i])
+    w.half_surface[i] = 0.5 * p.surface_soil_depth_m[i]
+    w.above_deep_node[i] = p.deep_soil_node_m[i] - p.surface_soil_depth_m[i]
+    w.per_below_deep_node[i] = 1.0 / (p.boundary_depth_m[i] - p.deep_soil_node_m[i])
+
+
+@compiled
+def boundary_temperature(b, i) -> float:
+    """Temperature of the boundary far below [degC]."""
+    return b.p.deep_boundary_temperature_k[i] - FREEZING_POINT_K
+
+
+@compiled
+def soil_conductances(b):
+    """Temperatures of the two nodes at the start of the step, and the conductances between ground, nodes, boundary."""
+    s, p, w = b.s, b.p, b.w
+    for i in range(len(s.swe)):
+        span = p.soil_freezing_range_k[i]
+        w.surface[i] = temperature(
+            s.surface_heat[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], span
+        )
+        w.deep[i] = temperature(s.deep_heat[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], span)
+        thawed, frozen = p.soil_conductivity[i], p.soil_conductivity[i] * w.frozen_ratio[i]
+        # A node thicker than the front's daily reach freezes and thaws from above: its upper half is as the ground is.
+        upper = conductivity(frozen_share(s.ground[i], span), thawed, frozen)
+        lower = conductivity(frozen_share(w.surface[i], span), thawed, frozen)
+        deep = conductivity(frozen_share(w.deep[i], span), thawed, frozen)
+        below = conductivity(frozen_share(0.5 * (w.deep[i] + boundary_temperature(b, i)), span), thawed, frozen)
+        organic = conductivity(
+            frozen_share(0.5 * (s.ground[i] + w.surface[i]), span),
+            p.organic_conductivity_thawed[i],
+            p.organic_conductivity_frozen[i],
+        )
+        w.upper_soil[i] = w.half_surface[i] / upper
+        above_and_below = s.swe[i] * w.snow_resistance[i] + w.upper_soil[i]  # of the organic layer
+        w.surface_conductance[i] = in_series(above_and_below, 1.0, s.organic_depth[i] * p.moss[i], organic)
+        w.deep_conductance[i] = in_series(w.half_surface[i], lower, w.above_deep_node[i], deep)
+        w.boundary_conductance[i] = below * w.per_below_deep_node[i]
+
+
+@compiled
+def renew_organic_layer(b, i):
+    """A year of growth or loss of the organic layer."""
+    s, p, w = b.s, b.p, b.w
+    s.organic_depth[i] = organic_layer(
+        s.organic_depth[i],
+        w.cover_conifer[i],
+        w.cover_deciduous[i],
+        p.organic_depth_conifer_m[i],
+        p.organic_depth_deciduous_m[i],
+        p.organic_depth_open_m[i],
+        p.organic_growth_m_yr[i],
+        p.organic_loss_years[i],
+    )
+
+
+@compiled
+def active_layer(b, i) -> float:
+    """Active-layer depth of the year [m], from its warmth and its mean deep temperature."""
+    s, p, w, r = b.s, b.p, b.w, b.r
+    thawed = p.soil_heat_capacity_thawed[i]
+    return thaw_depth(
+        s.organic_depth[i] * p.moss[i],
+        w.thaw_warmth[i],
+        w.thaw_seconds[i],
+        r.deep_soil_temperature_c[i],
+        boundary_temperature(b, i),
+        p.deep_soil_node_m[i],
+        p.boundary_depth_m[i],
+        p.soil_conductivity[i],
+        p.soil_conductivity[i] * w.frozen_ratio[i],
+        p.organic_conductivity_thawed[i],
+        thawed,
+        where_it_freezes(p.soil_freezing[i], thawed, p.soil_heat_capacity_frozen[i]),
+        w.surface_latent[i] / p.surface_soil_depth_m[i],
+    )

@@ -9,14 +9,13 @@ import math
 import numpy as np
 
 from sim import soil
-from sim.demography import AGE_CLASSES, AGES, OLDEST, SAPLING_LIMIT, SEEDLING_LIMIT
+from sim.demography import AGE_CLASSES, AGES, OLDEST, first_ages
 from sim.jit import uncompiled
 from sim.parameters import check_mapping
-from sim.snow import LATENT_HEAT_FUSION
+from sim.physical_constants import FREEZING_POINT_K
 from sim.state import DAYS, STATE
-from sim.weather import FREEZING_POINT_K
 
-enthalpy = uncompiled(soil.enthalpy)
+enthalpy, node_capacities = uncompiled(soil.enthalpy), uncompiled(soil.node_capacities)
 
 SPIN_UP_YEARS = 8
 SPIN_UP_STEPS_PER_DAY = 12
@@ -50,7 +49,6 @@ INITIAL_LIMITS = {
 
 LARGEST_STEM_KGC = 120.0
 YEARLY_SURVIVAL = 0.975
-_WATER_DENSITY = 1000.0
 
 
 def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float]:
@@ -137,26 +135,28 @@ def stems_of_ages(oldest_age: float) -> np.ndarray:
 
 def stems_of_classes(stocks: dict, parameters: dict) -> np.ndarray:
     """Stems by species and age, shape (2, AGES), spread evenly over the ages of each class."""
-    last = [SEEDLING_LIMIT, SAPLING_LIMIT, int(parameters["young_age_limit"]), int(parameters["mature_age_limit"])]
-    first = [0, *(age + 1 for age in last)]
+    first = first_ages(parameters)
     stems = np.zeros((2, AGES))
     for k, name in enumerate(CLASS_NAMES):
         row, age_class = divmod(k, len(AGE_CLASSES))
-        ages = slice(first[age_class], [*last, OLDEST][age_class] + 1)
+        ages = slice(first[age_class], first[age_class + 1])
         stems[row, ages] = stocks.get(name, 0.0) / (ages.stop - ages.start)
     return stems
 
 
 def soil_node(parameters: dict, node: str) -> tuple[float, float, float, float]:
     """Heat capacities thawed and frozen [J m-2 K-1], latent heat [J m-2] and freezing range [K] of a soil node."""
-    surface = parameters["surface_soil_depth_m"]
-    thickness = surface if node == "surface" else parameters["boundary_depth_m"] - surface
-    freezing = thickness if node == "surface" else min(thickness, 2.0 * (parameters["deep_soil_node_m"] - surface))
-    freezes = parameters["soil_freezing"]
-    thawed = parameters["soil_heat_capacity_thawed"]
-    frozen = thawed + freezes * (parameters["soil_heat_capacity_frozen"] - thawed)
-    latent = freezes * LATENT_HEAT_FUSION * _WATER_DENSITY * parameters["soil_freezing_water"]
-    return thawed * thickness, frozen * thickness, latent * freezing, parameters["soil_freezing_range_k"]
+    names = (
+        "soil_freezing",
+        "surface_soil_depth_m",
+        "deep_soil_node_m",
+        "boundary_depth_m",
+        "soil_heat_capacity_thawed",
+        "soil_heat_capacity_frozen",
+        "soil_freezing_water",
+    )
+    surface, deep = node_capacities(*(parameters[name] for name in names))
+    return *(surface if node == "surface" else deep), parameters["soil_freezing_range_k"]
 
 
 def climate_draws() -> dict[str, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.block import BACKENDS, blocks, run_block
 from sim.closure import check_closure
-from sim.demography import AGES, SAPLING_LIMIT, SEEDLING_LIMIT
+from sim.demography import AGES, first_ages
 from sim.draws import Seeds, draw_slice, draw_year, restored_generator
 from sim.management import check_actions, first_cut_age
 from sim.parameters import check_constants, check_mechanisms
@@ -94,7 +94,7 @@ class Stands:
     def start(self, stands, sites, seeds, initial=None, initial_ranges=None, observed=None) -> None:
         """Put stands at the beginning of an episode: draw their first state and spin it up.
 
-        stands : indices; sites : for each, its 62 parameters by name; seeds : for each, its `Seeds`;
+        stands : indices; sites : for each, its parameters by name; seeds : for each, its `Seeds`;
         initial : position in `stands` -> dict of first stocks by record name; initial_ranges : ranges that the first
         stocks are drawn from, name -> (low, high), instead of `sim.spin_up.INITIAL_RANGES`; observed : a year's
         forcing to spin up with, instead of generated weather (a part of a year is not used).
@@ -167,9 +167,7 @@ class Stands:
         """Stems and carbon of stands now, by record name, shape (stands,); `age_classes` has shape (stands, 10)."""
         state = self.state[stands]
         stems = state[:, len(STATE) :].reshape(len(state), 2, AGES)
-        edges = [0, SEEDLING_LIMIT + 1, SAPLING_LIMIT + 1]
-        edges += [int(self.constants["young_age_limit"]) + 1, int(self.constants["mature_age_limit"]) + 1]
-        classes = np.add.reduceat(stems, edges, axis=2).reshape(len(state), -1)
+        classes = np.add.reduceat(stems, first_ages(self.constants)[:-1], axis=2).reshape(len(state), -1)
         density = stems.sum(axis=(1, 2))
         conifers = stems[:, 0].sum(axis=1)
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from sim.demography import AGE_CLASSES, AGES
 from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS
+from sim.physical_constants import DAYS_PER_YEAR
 
-DAYS = 365
+DAYS = DAYS_PER_YEAR
 
 #: State that lasts from year to year: name -> (unit, meaning).
 STATE = {
@@ -35,16 +36,16 @@ STATE = {
     "drought": ("mm", "running drought index"),
 }
 
-#: A year's random numbers: name -> (per day?, distribution).
+#: A year's random numbers: name -> (per day?, distribution, the stream that they are from).
 DRAWS = {
-    "temperature_noise": (True, "normal"),
-    "wet_dice": (True, "uniform"),
-    "wet_amount": (True, "exponential"),
-    "fire_dice": (True, "uniform"),
-    "fire_kill": (False, "uniform"),
-    "fire_depth": (False, "uniform"),
-    "insect_dice": (False, "uniform"),
-    "mortality_dice": (False, "uniform"),
+    "temperature_noise": (True, "normal", "weather"),
+    "wet_dice": (True, "uniform", "weather"),
+    "wet_amount": (True, "exponential", "weather"),
+    "fire_dice": (True, "uniform", "disturbance"),
+    "fire_kill": (False, "uniform", "disturbance"),
+    "fire_depth": (False, "uniform", "disturbance"),
+    "insect_dice": (False, "uniform", "disturbance"),
+    "mortality_dice": (False, "uniform", "disturbance"),
 }
 
 #: The annual record: name -> (unit, meaning). Sums, means, extremes or end-of-year stocks, as the meaning says.
@@ -120,33 +121,33 @@ RECORD = {
     "stems_residual_ha": ("stems ha-1", "failure of the year to close"),
 }
 
-#: Columns of daily output, in order.
-DAILY = (
-    "air_temperature_c",
-    "precipitation_mm",
-    "gpp_kgc_m2",
-    "autotrophic_respiration_kgc_m2",
-    "heterotrophic_respiration_kgc_m2",
-    "shortwave_mj_m2",
-    "net_radiation_mj_m2",
-    "sensible_heat_mj_m2",
-    "latent_heat_mj_m2",
-    "ground_heat_mj_m2",
-    "boundary_heat_mj_m2",
-    "evapotranspiration_mm",
-    "runoff_mm",
-    "swe_mm",
-    "canopy_snow_mm",
-    "soil_water_mm",
-    "canopy_temperature_c",
-    "ground_temperature_c",
-    "surface_soil_temperature_c",
-    "deep_soil_temperature_c",
-    "albedo",
-    "lai",
-    "organic_layer_m",
-    "soil_top_temperature_c",
-)
+#: Daily output: name -> (unit, meaning).
+DAILY = {
+    "air_temperature_c": ("degC", "mean"),
+    "precipitation_mm": ("mm", "rain and snow"),
+    "gpp_kgc_m2": ("kgC m-2", "gross primary production"),
+    "autotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of the trees"),
+    "heterotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of litter and soil"),
+    "shortwave_mj_m2": ("MJ m-2", "incoming shortwave"),
+    "net_radiation_mj_m2": ("MJ m-2", "net radiation of the stand"),
+    "sensible_heat_mj_m2": ("MJ m-2", "sensible heat to the air"),
+    "latent_heat_mj_m2": ("MJ m-2", "latent heat to the air"),
+    "ground_heat_mj_m2": ("MJ m-2", "heat from the ground's surface into the soil"),
+    "boundary_heat_mj_m2": ("MJ m-2", "heat into the permafrost boundary, less heat out of it"),
+    "evapotranspiration_mm": ("mm", "transpiration, evaporation and sublimation"),
+    "runoff_mm": ("mm", "water beyond the bucket's capacity"),
+    "swe_mm": ("mm", "snow on the ground at the day's end, as water"),
+    "canopy_snow_mm": ("mm", "snow held by the canopy at the day's end"),
+    "soil_water_mm": ("mm", "water in the soil bucket at the day's end"),
+    "canopy_temperature_c": ("degC", "mean"),
+    "ground_temperature_c": ("degC", "mean of snow surface or skin"),
+    "surface_soil_temperature_c": ("degC", "mean"),
+    "deep_soil_temperature_c": ("degC", "mean"),
+    "albedo": ("1", "reflected over incoming shortwave; no number without light"),
+    "lai": ("m2 m-2", "leaf area of both species"),
+    "organic_layer_m": ("m", "depth of moss and organic layer"),
+    "soil_top_temperature_c": ("degC", "mean at the top of the mineral soil"),
+}
 
 #: Columns of an observed forcing, in order.
 FORCING = (
@@ -162,32 +163,35 @@ FORCING = (
 #: What a step, a day or a year computes and hands on; nothing here lasts beyond the year.
 _WORK = """
 above_deep_node advected air air_density air_emission air_sum amplitude anomaly bare_gain biomass_before
-boundary_before boundary_conductance canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum canopy_sw
+boundary_conductance canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum canopy_sw canopy_to_trunk carried
 cos_latitude cos_peak cos_warmest cos_zenith cover_conifer cover_deciduous crown_area deep deep_base deep_by_surface
-deep_conductance deep_frozen deep_latent deep_sum deep_thawed deficit density_change diffuse dry_coefficient
-dryness_conifer dryness_deciduous emissivity energy_before energy_gain et_before extraterrestrial first_cut_age fixed
-frozen_ratio gpp_before gpp_conifer gpp_deciduous ground_base ground_by_canopy ground_by_emission ground_conductance
-ground_exchange ground_latent ground_log ground_new ground_sum ground_sw ground_velocity ground_wind half_surface high
-humidity infiltration lai_conifer lai_deciduous latent_before latent_slope leaf_coefficient leaf_conifer
-leaf_deciduous leaf_rate light_use_conifer light_use_deciduous log_q10 longwave_cover low mean_temperature melt_span
-minimum_temperature mix net net_before optical_conifer optical_deciduous per_below_deep_node per_rain_capacity
-precipitation precipitation_step products_before products_decay ra_before rain rain_capacity reflected reflected_sum
-residual rh_before runoff_before saturation_slope sensible_before share_conifer shortwave shortwave_sum sin_latitude
-sin_peak sin_warmest sky sky_conifer sky_deciduous snow snow_area snow_density snow_efficiency snow_hiding snow_latent
-snow_log snow_resistance snow_wind soil_before soil_heat_sum soil_rate soil_top stems_before stems_gain summer_down
-summer_up sun_a sun_b surface surface_base surface_by_ground surface_conductance surface_frozen surface_latent
-surface_sum surface_thawed sw_before temperature_stress_conifer temperature_stress_deciduous thaw_seconds thaw_warmth
-top_of_canopy top_sum transpiration_conifer transpiration_deciduous trial trunk_air trunk_base trunk_by_canopy
-trunk_by_ground trunk_canopy trunk_ground unloading_rate upper_soil vapour vapour_density water_before water_gain
-water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
+deep_conductance deep_frozen deep_latent deep_sum deep_thawed deep_to_boundary deficit density_change diffuse
+dry_coefficient dryness_conifer dryness_deciduous emissivity energy_before energy_gain evaporated extraterrestrial
+first_cut_age fixed frozen_ratio gpp_conifer gpp_deciduous ground_base ground_by_canopy ground_by_emission
+ground_conductance ground_exchange ground_latent ground_log ground_new ground_sum ground_sw ground_to_air
+ground_to_surface ground_velocity ground_wind half_surface high humidity infiltration lai_conifer lai_deciduous
+latent_slope leaf_coefficient leaf_conifer leaf_deciduous leaf_rate light_use_conifer light_use_deciduous log_q10
+longwave_cover low mean_temperature melt_span melted minimum_temperature mix net net_stand optical_conifer
+optical_deciduous per_below_deep_node per_rain_capacity precipitation precipitation_step products_before products_decay
+rain rain_capacity reflected reflected_sum residual runoff saturation_slope sensible share_conifer shortwave
+shortwave_sum sin_latitude sin_peak sin_warmest sky sky_conifer sky_deciduous snow snow_area snow_density
+snow_efficiency snow_hiding snow_latent snow_log snow_resistance snow_wind soil_before soil_evaporated soil_heat_sum
+soil_rate soil_top stems_before stems_gain sublimated summer_down summer_up sun_a sun_b surface surface_base
+surface_by_ground surface_conductance surface_frozen surface_latent surface_sum surface_thawed surface_to_deep
+temperature_stress_conifer temperature_stress_deciduous thaw_seconds thaw_warmth top_of_canopy top_sum
+transpiration_conifer transpiration_deciduous transpired trial trunk_air trunk_base trunk_by_canopy trunk_by_ground
+trunk_canopy trunk_ground trunk_to_air trunk_to_ground unloading_rate upper_soil vapour vapour_density vapour_lost
+water_before water_gain water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up
+wood_rate
 """.split()
 
 
 PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS)
 STATE_NAMES = tuple(STATE)
 RECORD_NAMES = tuple(RECORD)
+DAILY_NAMES = tuple(DAILY)
 STATE_SIZE = len(STATE) + 2 * AGES
-DRAWS_SIZE = sum(DAYS if daily else 1 for daily, _ in DRAWS.values())
+DRAWS_SIZE = sum(DAYS if daily else 1 for daily, *_ in DRAWS.values())
 
 
 @functools.cache
@@ -197,7 +201,7 @@ def block_dtype(lanes: int) -> np.dtype:
     parameters = [(name, "f8", lane) for name in PARAMETER_NAMES]
     state = [(name, "f8", lane) for name in STATE]
     state += [("conifer_stems", "f8", by_age), ("deciduous_stems", "f8", by_age)]
-    draws = [(name, "f8", by_day if daily else lane) for name, (daily, _) in DRAWS.items()]
+    draws = [(name, "f8", by_day if daily else lane) for name, (daily, *_) in DRAWS.items()]
     return np.dtype(
         [
             ("p", parameters),
@@ -207,3 +211,9 @@ def block_dtype(lanes: int) -> np.dtype:
             ("w", [(name, "f8", lane) for name in _WORK]),
         ]
     )
+
+
+@functools.cache
+def daily_dtype(lanes: int) -> np.dtype:
+    """dtype of a day's output of a block of stands."""
+    return np.dtype([(name, "f8", (lanes,)) for name in DAILY])

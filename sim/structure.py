@@ -1,11 +1,32 @@
-"""From stems to crowns: cover, the two species' shares, and the light use of old trees."""
+"""From stems to crowns and leaves: cover, the two species' shares, light use of old trees, leaf area of the day."""
 
-from sim.canopy import crown_factor
 from sim.demography import AGES, OLDEST
 from sim.jit import compiled, phase
 from sim.mathematics import exponential
+from sim.physical_constants import SQUARE_METRES_PER_HECTARE
+from sim.radiation import canopy_interception
 
-SQUARE_METRES_PER_HECTARE = 1e4
+
+@compiled
+def crown_factor(age, seedling, sapling, young, mature, old) -> float:
+    """Crown area of a stem relative to a mature one, straight lines between the values at 3, 13, 30, 70, 101 years."""
+    if age < 3:
+        return seedling * age / 3.0
+    if age < 13:
+        return seedling + (sapling - seedling) * (age - 3.0) / 10.0
+    if age < 30:
+        return sapling + (young - sapling) * (age - 13.0) / 17.0
+    if age < 70:
+        return young + (mature - young) * (age - 30.0) / 40.0
+    return mature + (old - mature) * (min(age, 101.0) - 70.0) / 31.0
+
+
+@compiled
+def leaf_out(day, start, spring_rate, fall, autumn_rate) -> float:
+    """Share of the deciduous leaf area that is out: half on the start and the fall day, logistic in between."""
+    spring = 1.0 / (1.0 + exponential(-spring_rate * (day + 1.0 - start)))
+    autumn = 1.0 / (1.0 + exponential(autumn_rate * (day + 1.0 - fall)))
+    return spring * autumn
 
 
 @phase
@@ -15,7 +36,7 @@ def crown_areas(b, i):
     conifer = 0.0
     deciduous = 0.0
     for age in range(AGES):
-        conifer += s.conifer_stems[age, i] * crown_factor(
+        conifer_crown = crown_factor(
             age,
             p.crown_conifer_seedling[i],
             p.crown_conifer_sapling[i],
@@ -23,27 +44,19 @@ def crown_areas(b, i):
             p.crown_conifer_mature[i],
             p.crown_conifer_old[i],
         )
-        if p.crown_development[i] > 0.0:
-            factor = crown_factor(
-                age,
-                p.crown_deciduous_seedling[i],
-                p.crown_deciduous_sapling[i],
-                p.crown_deciduous_young[i],
-                p.crown_deciduous_mature[i],
-                p.crown_deciduous_old[i],
-            )
-        else:
-            factor = crown_factor(
-                age,
-                p.crown_conifer_seedling[i],
-                p.crown_conifer_sapling[i],
-                p.crown_conifer_young[i],
-                p.crown_conifer_mature[i],
-                p.crown_conifer_old[i],
-            )
-        deciduous += s.deciduous_stems[age, i] * factor
+        own_crown = crown_factor(
+            age,
+            p.crown_deciduous_seedling[i],
+            p.crown_deciduous_sapling[i],
+            p.crown_deciduous_young[i],
+            p.crown_deciduous_mature[i],
+            p.crown_deciduous_old[i],
+        )
+        deciduous_crown = own_crown if p.crown_development[i] > 0.0 else conifer_crown
+        conifer += s.conifer_stems[age, i] * conifer_crown
+        deciduous += s.deciduous_stems[age, i] * deciduous_crown
     old_conifer = s.conifer_stems[OLDEST, i] * p.crown_conifer_old[i]
-    old_deciduous = s.deciduous_stems[OLDEST, i] * factor  # the last age's
+    old_deciduous = s.deciduous_stems[OLDEST, i] * deciduous_crown  # the last age's
     w.light_use_conifer[i] = p.light_use_conifer[i] * _decline(old_conifer, conifer, p.light_use_old[i])
     w.light_use_deciduous[i] = p.light_use_deciduous[i] * _decline(old_deciduous, deciduous, p.light_use_old[i])
 
@@ -61,3 +74,33 @@ def _decline(old, all_crowns, light_use_old) -> float:
     """Light use relative to a stand without old trees, by the old trees' share of the crowns."""
     share = min(old / all_crowns, 1.0) if all_crowns > 0.0 else 0.0
     return 1.0 - share * (1.0 - light_use_old)
+
+
+@phase
+def leaves(b, day):
+    """Leaf area and optical depths of the day."""
+    p, w = b.p, b.w
+    for i in range(len(b.s.swe)):
+        leaf = leaf_out(day, p.growth_start_day[i], p.growth_rate[i], p.fall_start_day[i], p.fall_rate[i])
+        green_conifer = p.max_lai_conifer[i]
+        green_deciduous = p.max_lai_deciduous[i] * leaf
+        area_conifer = green_conifer + p.woody_area_index[i]
+        area_deciduous = green_deciduous + p.max_lai_deciduous[i] * p.leafless_share[i] + p.woody_area_index[i]
+        w.optical_conifer[i] = p.light_extinction[i] * area_conifer
+        w.optical_deciduous[i] = p.light_extinction[i] * area_deciduous
+        w.leaf_conifer[i] = green_conifer / area_conifer
+        w.leaf_deciduous[i] = green_deciduous / area_deciduous
+        w.lai_conifer[i] = green_conifer * w.cover_conifer[i]
+        w.lai_deciduous[i] = green_deciduous * w.cover_deciduous[i]
+        w.snow_area[i] = w.cover_conifer[i] * area_conifer + w.cover_deciduous[i] * area_deciduous
+
+
+@phase
+def sky_cover(b):
+    """Shares of the sky that each species hides from the ground, for hemispheric light and longwave."""
+    p, w = b.p, b.w
+    for i in range(len(b.s.swe)):
+        w.sky_conifer[i], w.sky_deciduous[i] = canopy_interception(
+            p.sky_path[i], w.crown_area[i], w.share_conifer[i], w.optical_conifer[i], w.optical_deciduous[i]
+        )
+        w.longwave_cover[i] = w.sky_conifer[i] + w.sky_deciduous[i]

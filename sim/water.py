@@ -18,3 +18,13 @@ def water_stress(water, capacity, threshold, seconds) -> float:
 def runoff(water, capacity) -> float:
     """Water beyond capacity [mm]."""
     return max(water - capacity, 0.0)
+
+
+@compiled
+def drought_stress(b, seconds):
+    """Stress by dry soil of the step."""
+    s, p, w = b.s, b.p, b.w
+    for i in range(len(s.swe)):
+        w.water_stress[i] = water_stress(
+            s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds
+        )

@@ -8,13 +8,12 @@ import math
 
 from sim.jit import compiled
 from sim.mathematics import exponential
+from sim.physical_constants import DAYS_PER_YEAR, FREEZING_POINT_K, GAS_CONSTANT
 
-SOLAR_CONSTANT = 1361.0  # W m-2
-STEFAN_BOLTZMANN = 5.670374419e-8  # W m-2 K-4
-FREEZING_POINT_K = 273.15
-SATURATION_AT_FREEZING_HPA = 6.1121
-PSYCHROMETRIC_PER_HPA = 1005.0 / (0.622 * 2.5e6)  # K-1; heat capacity of air / latent heat; times the air pressure
-DAYS_PER_YEAR = 365
+#: Saturation vapour pressure e = scale exp(a T / (T + b)), T in degC: scale [hPa], a, b [degC].
+OVER_ICE = (6.1121, 22.587, 273.86)
+OVER_WATER = (6.1094, 17.625, 243.04)
+SATURATION_AT_FREEZING_HPA = OVER_ICE[0]
 LARGEST_RAIN_GROWTH = 1.0  # logarithm
 
 
@@ -22,9 +21,9 @@ LARGEST_RAIN_GROWTH = 1.0  # logarithm
 def saturation_pressure(temperature: float) -> float:
     """Saturation vapour pressure [hPa] over water above 0 degC, over ice below (Alduchov and Eskridge 1996)."""
     over_ice = temperature <= 0.0
-    scale = 6.1121 if over_ice else 6.1094
-    a = 22.587 if over_ice else 17.625
-    b = 273.86 if over_ice else 243.04
+    scale = OVER_ICE[0] if over_ice else OVER_WATER[0]
+    a = OVER_ICE[1] if over_ice else OVER_WATER[1]
+    b = OVER_ICE[2] if over_ice else OVER_WATER[2]
     return scale * exponential(a * temperature * (1.0 / (temperature + b)))
 
 
@@ -32,8 +31,8 @@ def saturation_pressure(temperature: float) -> float:
 def saturation_slope(temperature: float, saturation: float) -> float:
     """Derivative of `saturation_pressure` [hPa K-1], given its value."""
     over_ice = temperature <= 0.0
-    a = 22.587 if over_ice else 17.625
-    b = 273.86 if over_ice else 243.04
+    a = OVER_ICE[1] if over_ice else OVER_WATER[1]
+    b = OVER_ICE[2] if over_ice else OVER_WATER[2]
     inverse = 1.0 / (temperature + b)  # which `saturation_pressure` has too: one division for both
     return saturation * (a * b) * (inverse * inverse)
 
@@ -41,7 +40,13 @@ def saturation_slope(temperature: float, saturation: float) -> float:
 @compiled
 def saturation_pressure_water(temperature: float) -> float:
     """Saturation vapour pressure [hPa] over (supercooled) water, to which relative humidity refers."""
-    return 6.1094 * exponential(17.625 * temperature / (temperature + 243.04))
+    return OVER_WATER[0] * exponential(OVER_WATER[1] * temperature / (temperature + OVER_WATER[2]))
+
+
+@compiled
+def air_density(pressure_hpa, temperature) -> float:
+    """Density of air [kg m-3]."""
+    return 100.0 * pressure_hpa / (GAS_CONSTANT * (temperature + FREEZING_POINT_K))
 
 
 @compiled
@@ -54,6 +59,12 @@ def season(day: int) -> int:
     if day < 243:
         return 2
     return 3
+
+
+@compiled
+def december_to_march(day: int) -> bool:
+    """Whether a day belongs to the months of the winter albedo."""
+    return season(day) == 0 or day < 90
 
 
 @compiled
@@ -112,6 +123,18 @@ def diurnal_amplitude(amplitude, precipitation, sensitivity, threshold, largest_
     """Half-range of the day's temperature [degC], damped by rain and by a low sun (`sun`: share of full sun)."""
     reduction = min(largest_reduction, sensitivity * max(0.0, precipitation - threshold))
     return max(amplitude * (1.0 - reduction), min(smallest, amplitude)) * sun
+
+
+@compiled
+def hour_angle(step: int, steps_per_day: int) -> float:
+    """Angle of the sun [rad] from its noon, at the middle of a step of the day."""
+    return 2.0 * math.pi * ((step + 0.5) / steps_per_day - 0.5)
+
+
+@compiled
+def cos_zenith(constant, by_hour, cos_hour) -> float:
+    """Cosine of the sun's zenith angle, 0 below the horizon, from the day's two coefficients."""
+    return max(constant + by_hour * cos_hour, 0.0)
 
 
 @compiled

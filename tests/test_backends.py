@@ -13,7 +13,7 @@ from numba.core.dispatcher import Dispatcher
 import sim
 from sim import block
 from sim.block import kernel
-from sim.state import DAILY
+from sim.state import DAILY_NAMES
 
 NUMBER = 19  # a block of sixteen lanes, and three stands in one of eight
 MINUTES = 120
@@ -102,7 +102,7 @@ def test_observed_weather_is_the_same_interpreted_and_compiled():
     _, got = interpreted.step(np.array([12]), observed=observed, days=days, daily=True)
     assert difference(got, expected_days) <= 1e-9
     assert expected[0, sim.RECORD_NAMES.index("snowfall_mm")] > 10.0
-    assert expected_days[0, :, DAILY.index("gpp_kgc_m2")].sum() > 0.0
+    assert expected_days[0, :, DAILY_NAMES.index("gpp_kgc_m2")].sum() > 0.0
 
 
 def test_the_interpreted_backend_steps_lanes_too():

@@ -13,9 +13,9 @@ import pytest
 import sim
 from sim.closure import TOLERANCES
 from sim.demography import AGES
-from sim.snow import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
+from sim.physical_constants import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.spin_up import INITIAL_LIMITS
-from sim.state import DAILY, STATE_NAMES
+from sim.state import DAILY_NAMES, STATE_NAMES
 
 # Name -> (limits of the parameters, corners or even draws, time step in minutes, stands).
 CASES = {
@@ -64,7 +64,7 @@ def run(request):
         before = stands.state.copy()
         record, daily = stands.step(generator.integers(0, 25, number), daily=True)
         record = pd.DataFrame(record, columns=sim.RECORD_NAMES)
-        daily = SimpleNamespace(**{name: daily[:, :, i] for i, name in enumerate(DAILY)})
+        daily = SimpleNamespace(**{name: daily[:, :, i] for i, name in enumerate(DAILY_NAMES)})
         capacity = np.array([site["max_water_content_mm"] for site in sites])
         after = stands.state.copy()
         years.append(SimpleNamespace(before=before, after=after, record=record, daily=daily, capacity=capacity))
@@ -292,7 +292,9 @@ def test_snow_that_sublimates_away_within_a_step_does_not_heat_the_ground():
     site = sim.middle_site({"wind_speed_m_s": 15.0, "soil_roughness_m": 0.1})
     stands.start(np.arange(32), [site] * 32, [sim.episode_seeds(k) for k in range(32)])
     _, daily = stands.step(np.full(32, 12), daily=True)
-    difference = daily[:, :, DAILY.index("ground_temperature_c")] - daily[:, :, DAILY.index("air_temperature_c")]
+    difference = (
+        daily[:, :, DAILY_NAMES.index("ground_temperature_c")] - daily[:, :, DAILY_NAMES.index("air_temperature_c")]
+    )
     assert np.abs(difference).max() < 15.0
 
 

@@ -25,14 +25,17 @@ from reference_step import (
     take_step,
 )
 
-import sim.solve
-from sim.day import begin_day, clear_day, write_day
+import sim.canopy
+from sim.account import clear_day, write_day
+from sim.block import namespace
+from sim.day import begin_day
 from sim.demography import AGES
+from sim.forcing import hour_angles, step_weather
 from sim.jit import uncompiled
 from sim.parameters import CONSTANTS, MECHANISMS, ORDERED_CONSTANTS, SITE_PARAMETERS
-from sim.state import DAILY, DAYS, DRAWS, FORCING, RECORD, STATE, block_dtype
-from sim.step import simulate_step, step_weather
-from sim.year import begin_year, hour_angles
+from sim.state import DAILY, DAYS, DRAWS, FORCING, RECORD, STATE, block_dtype, daily_dtype
+from sim.step import simulate_step
+from sim.year import begin_year
 
 AGREEMENT = 1e-10  # of the natural scale
 STEPS = 2  # from each drawn state
@@ -52,7 +55,7 @@ KINDS = {
 
 # The kernel stops at a residual of 1e-7 W m-2: enough for budgets, not for ten digits of a thin canopy's temperature.
 with pytest.MonkeyPatch.context() as patch:
-    patch.setattr(sim.solve, "NEWTON_TOLERANCE", 1e-10)
+    patch.setattr(sim.canopy, "NEWTON_TOLERANCE", 1e-10)
     begin_year, begin_day, hour_angles, clear_day, step_weather, simulate_step, write_day = (
         uncompiled(phase)
         for phase in (begin_year, begin_day, hour_angles, clear_day, step_weather, simulate_step, write_day)
@@ -121,7 +124,7 @@ def draw_state(generator, p, day):
 def draw_generated(generator):
     """Draws of the year, of which the day sees its own, and the anomaly of the day before."""
     draws = {}
-    for name, (daily, distribution) in DRAWS.items():
+    for name, (daily, distribution, _) in DRAWS.items():
         size = DAYS if daily else 1
         if distribution == "normal":
             draws[name] = generator.standard_normal(size)
@@ -158,12 +161,7 @@ def fill_block(p, s, draws, anomaly):
     for group, values in (("p", vars(p)), ("s", s), ("d", draws), ("w", {"anomaly": anomaly})):
         for name, value in values.items():
             block[group][name][:] = np.reshape(value, block[group][name].shape)
-    return SimpleNamespace(
-        **{
-            group: SimpleNamespace(**{name: block[group][name] for name in block[group].dtype.names})
-            for group in "pswrd"
-        }
-    )
+    return namespace(block)
 
 
 def state_of(b):
@@ -175,13 +173,13 @@ def state_of(b):
 def kernel_step(b, step, steps_per_day, forcing):
     """Take one step with the kernel: what it adds to the record, and its row of daily output, by name."""
     record = {name: float(getattr(b.r, name)[0]) for name in RECORD}
-    row = np.zeros((len(DAILY), 1))
+    row = namespace(np.zeros(1, daily_dtype(1))[0])
     seconds = 86400.0 / steps_per_day
-    clear_day(b)
+    clear_day(b, 0, [row])
     step_weather(b, step, hour_angles(steps_per_day), seconds, forcing)
     simulate_step(b, seconds)
     write_day(b, 1, row)
-    daily = dict(zip(DAILY, row[:, 0].tolist(), strict=True))
+    daily = {name: float(getattr(row, name)[0]) for name in DAILY}
     means = {name for name in record if name.endswith("_temperature_c")}  # filled at the day's end
     added = {name: float(getattr(b.r, name)[0]) - record[name] for name in RECORD if name not in means}
     return daily | added

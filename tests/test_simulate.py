@@ -1,5 +1,7 @@
 """The scientist's door: the table, observed weather, overrides that change nothing else, refusals, magnitudes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -156,7 +158,17 @@ def test_every_mechanism_can_be_switched_off(mechanism):
 
 def test_a_site_seed_gives_the_same_site_again():
     assert sim.sample_site(5) == sim.sample_site(5) != sim.sample_site(6)
-    assert list(sim.sample_site(5)) == list(SITE_PARAMETERS) and len(SITE_PARAMETERS) == 62
+    assert list(sim.sample_site(5)) == list(SITE_PARAMETERS)
+
+
+def test_a_parameter_that_is_not_observed_changes_no_site(monkeypatch):
+    site = sim.sample_site(5)
+    hidden = replace(SITE_PARAMETERS["q10"], name="hidden", observed=False)
+    monkeypatch.setattr(sim.parameters, "SITE_PARAMETERS", {"hidden": hidden, **SITE_PARAMETERS})
+    with_hidden = sim.sample_site(5)
+    assert list(with_hidden)[0] == "hidden" and hidden.low <= with_hidden["hidden"] <= hidden.high
+    assert all(with_hidden[name] == site[name] for name in sim.OBSERVED_SITE_PARAMETERS)
+    assert (sim.scale_site(with_hidden) == sim.scale_site(site)).all()
 
 
 @pytest.mark.parametrize("name", SITE_PARAMETERS)
@@ -182,8 +194,7 @@ def test_sampled_sites_lie_in_their_ranges(seed):
         assert p.low <= site[name] <= p.high, name
     scaled = sim.scale_site(site)
     assert scaled.shape == (62,) and scaled.min() >= 0.0 and scaled.max() <= 1.0
-    names = list(SITE_PARAMETERS)
-    assert scaled[names.index("q10")] == pytest.approx((site["q10"] - 1.8) / 0.5)
+    assert scaled[sim.OBSERVED_SITE_PARAMETERS.index("q10")] == pytest.approx((site["q10"] - 1.8) / 0.5)
 
 
 def test_mean_annual_temperature_follows_latitude():

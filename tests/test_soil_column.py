@@ -15,9 +15,9 @@ from analysis.validation.surface import record_year
 from sim.block import namespace
 from sim.jit import uncompiled
 from sim.parameters import check_constants, check_mechanisms
-from sim.solve import conductances
+from sim.soil import soil_conductances
 from sim.spin_up import INITIAL_RANGES, first_state
-from sim.state import DAILY, DAYS, PARAMETER_NAMES, block_dtype
+from sim.state import DAYS, PARAMETER_NAMES, block_dtype, daily_dtype
 from sim.year import simulate_year
 
 PARAMETERS = {**sim.middle_site(), **check_constants(None), **check_mechanisms(None)}
@@ -95,7 +95,7 @@ def test_the_annual_wave_decays_with_depth():
 @pytest.mark.parametrize(("surface", "swe"), [(8.0, 0.0), (-20.0, 60.0), (-0.8, 30.0)])
 def test_two_nodes_have_the_simulators_conductances(surface, swe):
     b = block()
-    uncompiled(simulate_year)([b], 1, 1, np.zeros((0, 6, 1)), np.zeros((0, len(DAILY), 1)))
+    uncompiled(simulate_year)([b], 1, 1, np.zeros((0, 6, 1)), [])
     snow = swe * b.w.snow_resistance[0]
     steady = driven_by(np.full(DAYS, surface), snow=snow, organic=b.s.organic_depth[0])
     column = spun_up(SCHEMES["two nodes: the simulator's"], GROUND, steady)
@@ -103,7 +103,7 @@ def test_two_nodes_have_the_simulators_conductances(surface, swe):
         daily, (entering, warming, cooling) = column.run(steady)
     b.s.surface_heat[0], b.s.deep_heat[0] = column.heat
     b.s.ground[0], b.s.swe[0] = surface, swe
-    uncompiled(conductances)(b, 1800.0)
+    uncompiled(soil_conductances)(b)
     upper, lower = daily[-1]
     assert (b.w.surface[0], b.w.deep[0]) == approx((upper, lower), abs=1e-4)
     assert entering == approx(warming - cooling, rel=1e-4)
@@ -114,14 +114,14 @@ def test_two_nodes_have_the_simulators_conductances(surface, swe):
 
 
 def test_the_recorded_surface_is_the_simulators():
-    nothing = np.zeros((0, 6, 1)), np.zeros((0, len(DAILY), 1))
-    daily, surface = np.zeros((DAYS, len(DAILY), 1)), np.zeros((2, DAYS, 1))
+    no_weather, surface = np.zeros((0, 6, 1)), np.zeros((2, DAYS, 1))
+    daily = np.zeros(DAYS, daily_dtype(1))
     b = block()
-    uncompiled(record_year)(b, 1, *nothing, surface)
+    uncompiled(record_year)(b, 1, no_weather, [], surface)
     other = block()
-    uncompiled(simulate_year)([other], 1, DAYS, nothing[0], daily)
-    assert surface[0, :, 0] == approx(daily[:, DAILY.index("ground_temperature_c"), 0], abs=1e-12)
-    snowy = daily[:, DAILY.index("swe_mm"), 0] > 0.0
+    uncompiled(simulate_year)([other], 1, DAYS, no_weather, [namespace(row) for row in daily])
+    assert surface[0, :, 0] == approx(daily["ground_temperature_c"][:, 0], abs=1e-12)
+    snowy = daily["swe_mm"][:, 0] > 0.0
     assert 100 < snowy.sum() < 300 and ((surface[1, :, 0] > 0.0) == snowy).all()
 
 

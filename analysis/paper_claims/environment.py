@@ -34,7 +34,7 @@ def unique_actions(evidence):
 @claim("An observation has 105 entries, 43 without the site's parameters.", "Table 1; table of the observation")
 def observation_entries(evidence):
     entries = len(boreal_env.OBSERVATION_NAMES)
-    own = entries - len(sim.SITE_PARAMETERS)
+    own = entries - len(sim.OBSERVED_SITE_PARAMETERS)
     rows = [
         Row("entries", f"{sum(COMPONENTS)} by its components", Number(entries)),
         Row("entries without the site", f"{sum(COMPONENTS[:-1])} by its components", Number(own)),
@@ -52,7 +52,7 @@ def observation_entries(evidence):
 def listed_parameters(evidence):
     listed = Number(sum("table of sampling ranges" in one.source for one in sim.SITE_PARAMETERS.values()))
     rows = [
-        Row("site parameters in the observation", str(COMPONENTS[-1]), Number(len(sim.SITE_PARAMETERS))),
+        Row("site parameters in the observation", str(COMPONENTS[-1]), Number(len(sim.OBSERVED_SITE_PARAMETERS))),
         Row("of them with a range in the paper", "all", listed),
     ]
     return finding(rows, equals(listed.value, COMPONENTS[-1], "the number listed"), CONTRADICTS)

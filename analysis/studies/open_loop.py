@@ -12,7 +12,7 @@ import pandas as pd
 
 import boreal_env
 import sim
-from sim.weather import FREEZING_POINT_K
+from sim.physical_constants import FREEZING_POINT_K
 
 # Beyond what an environment draws (below 2^31), and not met in training, evaluation or the measured balance.
 FIRST_SITE_SEED = 3_000_000_000

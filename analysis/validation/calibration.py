@@ -15,6 +15,7 @@ from analysis.validation.climate_records import SEASONS, Climate
 from analysis.validation.document import Miss, number
 from analysis.validation.scores import skill
 from sim.parameters import CONSTANTS
+from sim.physical_constants import FREEZING_POINT_K
 
 WET_MM = 1.0  # of a day that counts as wet, as in the generator
 DRY_MM = 0.2  # below which a sky is called dry where its clouds were calibrated
@@ -184,4 +185,4 @@ def _predict(column: str, fitted: pd.DataFrame, days: pd.DataFrame) -> pd.Series
         return days["extraterrestrial"] * (received / possible).reindex(keys).to_numpy()
     cloud = fitted["cloud"].groupby(groups).mean().reindex(keys).to_numpy()
     clear = climate_records.clear_emissivity(days)
-    return (clear + (1.0 - clear) * cloud) * climate_records.black_body(days["air_temperature_c"])
+    return (clear + (1.0 - clear) * cloud) * climate_records.black_body(days["air_temperature_c"] + FREEZING_POINT_K)

@@ -7,20 +7,18 @@ import numpy as np
 import pandas as pd
 
 from analysis.validation import disaggregation, poker_flat, towers
+from sim import radiation
 from sim.jit import uncompiled
 from sim.parameters import CONSTANTS
+from sim.physical_constants import FREEZING_POINT_K, PSYCHROMETRIC_PER_HPA, SOLAR_CONSTANT
 from sim.weather import (
-    FREEZING_POINT_K,
-    PSYCHROMETRIC_PER_HPA,
-    SOLAR_CONSTANT,
-    STEFAN_BOLTZMANN,
     saturation_pressure,
     saturation_slope,
     sky_emissivity,
     solar_distance_factor,
 )
 
-distance_factor = uncompiled(solar_distance_factor)
+black_body, distance_factor = uncompiled(radiation.black_body), uncompiled(solar_distance_factor)
 emissivity = uncompiled(sky_emissivity)
 saturation_of, slope_of = uncompiled(saturation_pressure), uncompiled(saturation_slope)
 
@@ -117,7 +115,7 @@ def extraterrestrial(index: pd.DatetimeIndex, latitude_deg: float) -> np.ndarray
 def cloud_term(days: pd.DataFrame) -> pd.Series:
     """Share of the clear sky's missing emissivity that clouds close, from measured longwave (`sim.weather`)."""
     clear = clear_emissivity(days)
-    return (days["longwave_w_m2"] / black_body(days["air_temperature_c"]) - clear) / (1.0 - clear)
+    return (days["longwave_w_m2"] / black_body(days["air_temperature_c"] + FREEZING_POINT_K) - clear) / (1.0 - clear)
 
 
 def clear_emissivity(days: pd.DataFrame) -> pd.Series:
@@ -125,11 +123,6 @@ def clear_emissivity(days: pd.DataFrame) -> pd.Series:
     air = days[["air_temperature_c", "vapour_pressure_hpa"]].dropna()
     values = [emissivity(temperature, vapour, 0.0) for temperature, vapour in air.to_numpy()]
     return pd.Series(values, index=air.index).reindex(days.index)
-
-
-def black_body(air: pd.Series) -> pd.Series:
-    """Radiation of a black body [W m-2] at temperatures in degC."""
-    return STEFAN_BOLTZMANN * (air + FREEZING_POINT_K) ** 4
 
 
 def equilibrium_share(air: pd.Series) -> pd.Series:

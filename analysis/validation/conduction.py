@@ -12,11 +12,15 @@ import numpy as np
 from sim import soil
 from sim.jit import phase, uncompiled
 from sim.parameters import CONSTANTS
-from sim.snow import LATENT_HEAT_FUSION
+from sim.physical_constants import (
+    FREEZING_POINT_K,
+    LATENT_HEAT_FUSION,
+    SECONDS_PER_DAY,
+    SECONDS_PER_HOUR,
+    WATER_DENSITY,
+)
 from sim.soil import conductivity, frozen_share, temperature
-from sim.weather import FREEZING_POINT_K
 
-WATER_DENSITY = 1000.0  # kg m-3
 STABLE_SHARE = 0.8  # of the longest step of an explicit scheme
 BALANCED_J_M2 = 2e4  # heat gained in a year of spin-up at which it ends
 LONGEST_SPIN_UP_YEARS = 600
@@ -114,13 +118,13 @@ def conduct(
             heat[i] *= layer / thickness[i]  # depth that comes or goes takes its heat along
             thickness[i], above[i], below[i] = layer, 0.5 * layer, 0.5 * layer
             thawed[i], frozen[i], latent[i] = organic_heat[0] * layer, organic_heat[1] * layer, organic_heat[2] * layer
-        longest = 3600.0
+        longest = SECONDS_PER_HOUR
         for i in range(layers):
             up = above[i] / hard[i] + (below[i - 1] / hard[i - 1] if i > 0 else 0.0)
             under = below[i] / hard[i] + (above[i + 1] / hard[i + 1] if i < last else 0.0)
             longest = min(longest, STABLE_SHARE * min(thawed[i], frozen[i]) / (1.0 / up + 1.0 / under))
-        steps = int(np.ceil(86400.0 / per_day / longest))
-        seconds = 86400.0 / per_day / steps
+        steps = int(np.ceil(SECONDS_PER_DAY / per_day / longest))
+        seconds = SECONDS_PER_DAY / per_day / steps
         for interval in range(day * per_day, (day + 1) * per_day):
             top, snow = surface.temperature[interval], surface.snow[interval]
             for _ in range(steps):

@@ -11,7 +11,7 @@ import pandas as pd
 
 import sim
 from sim.stands import HELD_IN_SPIN_UP, STATE_NAMES
-from sim.state import DAILY, DAYS
+from sim.state import DAILY_NAMES, DAYS
 
 NO_CHANGE = 10  # action 5 * 2 + 0: density index 2 leaves the stand alone
 MONTH = pd.date_range("2001-01-01", periods=DAYS).month.to_numpy()  # of each day of a year without leap day
@@ -79,11 +79,11 @@ def hold(
             continue
         annual.append(record.copy())
         months.append(np.stack([_mean(days[:, MONTH == month]) for month in range(1, 13)], axis=1))
-        daily.append(days[:, :, [DAILY.index(name) for name in keep_daily]].copy())
+        daily.append(days[:, :, [DAILY_NAMES.index(name) for name in keep_daily]].copy())
     annual, months, daily = (np.stack(values) for values in (annual, months, daily))
     return Run(
         annual={name: annual[..., i] for i, name in enumerate(sim.RECORD_NAMES)},
-        months={name: months[..., i] for i, name in enumerate(DAILY)},
+        months={name: months[..., i] for i, name in enumerate(DAILY_NAMES)},
         daily={name: daily[..., i] for i, name in enumerate(keep_daily)},
     )
 

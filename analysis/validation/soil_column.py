@@ -24,7 +24,7 @@ from analysis.validation.surface import RecordedStands
 from cleanrl_style import protocol
 from sim.parameters import CONSTANTS
 from sim.stands import available_cores
-from sim.state import DAILY, DAYS, PARAMETER_NAMES, STATE_NAMES
+from sim.state import DAILY_NAMES, DAYS, PARAMETER_NAMES, STATE_NAMES
 
 POLICIES = {"zero change": 12, "+100 conifers": 24, "+100 deciduous": 20}
 NO_POLICY = "zero change"  # what the others' effects are differences from
@@ -158,7 +158,7 @@ def run_schemes(args: Args, schemes: dict[str, Grid]) -> tuple[pd.DataFrame, pd.
         columns = list(pool.map(lambda g, s: [spun_up(grid, g, s) for grid in schemes.values()], grounds, surfaces))
         for _ in range(args.years):
             record, daily = stands.step(actions, daily=True)
-            surfaces = map(Surface, *stands.surface, daily[:, :, DAILY.index("organic_layer_m")].copy())
+            surfaces = map(Surface, *stands.surface, daily[:, :, DAILY_NAMES.index("organic_layer_m")].copy())
             years.append(list(pool.map(lambda cs, s: [run_year(column, s) for column in cs], columns, surfaces)))
             records.append(record)
     rows = {}

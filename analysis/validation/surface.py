@@ -9,13 +9,16 @@ import functools
 import numpy as np
 
 import sim
-from sim.day import begin_day, end_day
+from sim.account import clear_day, end_day
+from sim.block import filled_block
+from sim.day import begin_day
+from sim.forcing import hour_angles, step_weather
 from sim.jit import phase, specialised
-from sim.management import decode
+from sim.physical_constants import SECONDS_PER_DAY
 from sim.spin_up import climate_draws
-from sim.state import DAILY, DAYS, DRAWS, block_dtype
-from sim.step import simulate_step, step_weather
-from sim.year import begin_year, end_year, hour_angles
+from sim.state import DAYS, DRAWS, daily_dtype
+from sim.step import simulate_step
+from sim.year import begin_year, end_year
 
 NO_CHANGE = 12
 
@@ -25,10 +28,11 @@ def record_year(b, steps_per_day, no_weather, no_daily, surface):
     """`sim.year.simulate_year` under generated weather, which writes `surface`, shape (2, steps, lanes): temperature
     of the ground [degC] and resistance of the snow [m2 K W-1] at each step's end."""
     begin_year(b)
-    seconds = 86400.0 / steps_per_day
+    seconds = SECONDS_PER_DAY / steps_per_day
     hours = hour_angles(steps_per_day)
     for day in range(DAYS):
         begin_day(b, day, no_weather)
+        clear_day(b, day, no_daily)
         for t in range(steps_per_day):
             step_weather(b, t, hours, seconds, no_weather)
             simulate_step(b, seconds)
@@ -54,7 +58,7 @@ class RecordedStands(sim.Stands):
     def climate_year(self) -> np.ndarray:
         """The surface of the climate's mean year, with which `start` brought soil and snow into balance."""
         mean = climate_draws()
-        draws = [np.broadcast_to(mean.get(name, 0.0), DAYS if daily else 1) for name, (daily, _) in DRAWS.items()]
+        draws = [np.broadcast_to(mean.get(name, 0.0), DAYS if daily else 1) for name, (daily, *_) in DRAWS.items()]
         draws = np.tile(np.concatenate(draws), (self.number, 1))
         self._run(np.arange(self.number), draws, np.full(self.number, NO_CHANGE))
         return self.surface
@@ -64,14 +68,17 @@ class RecordedStands(sim.Stands):
         than the stands'."""
         if options.get("steps_per_day", self.steps_per_day) == self.steps_per_day:
             number = len(stands)
-            block = np.zeros(1, block_dtype(number))
-            given = np.concatenate([self.parameters[stands], self.state[stands], draws], axis=1).T
-            block.view("f8").reshape(-1, number)[: len(given)] = given
-            work = block[0]["w"]
-            work["density_change"], work["mix"] = decode(actions)
-            work["first_cut_age"], work["products_decay"] = self.first_cut_age, self.products_decay
+            block, _ = filled_block(
+                number,
+                self.parameters[stands],
+                self.state[stands],
+                draws,
+                actions,
+                first_cut_age=self.first_cut_age,
+                products_decay=self.products_decay,
+            )
             surface = np.zeros((2, DAYS * self.steps_per_day, number))
-            nothing = np.zeros((0, 6, number)), np.zeros((0, len(DAILY), number))
+            nothing = np.zeros((0, 6, number)), np.zeros(0, daily_dtype(number))
             kernel(number)(block[0], self.steps_per_day, *nothing, surface)
             self.surface = np.ascontiguousarray(surface.transpose(0, 2, 1))
         return super()._run(stands, draws, actions, *arguments, **options)

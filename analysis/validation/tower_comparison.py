@@ -17,8 +17,8 @@ from analysis.validation.document import Miss, number
 from analysis.validation.held_stands import NO_CHANGE
 from analysis.validation.scores import Skill, skill
 from analysis.validation.tower_stands import TowerStand
+from sim.physical_constants import MJ_PER_DAY
 
-MJ_PER_DAY = 0.0864  # MJ m-2 day-1 of 1 W m-2
 MEASURED_SHARE = 0.5
 FEWEST_DAYS = 5
 SNOW_GONE_MM = 1.0

@@ -17,7 +17,7 @@ from analysis.validation.document import Miss, Part, number, percent
 from analysis.validation.scores import skill
 from analysis.validation.tower_comparison import QUANTITIES
 from sim.parameters import CONSTANTS
-from sim.snow import LATENT_HEAT_FUSION
+from sim.physical_constants import LATENT_HEAT_FUSION, MJ_PER_DAY, WATER_DENSITY
 from sim.state import DAYS
 
 SUMMER = (6, 7, 8)
@@ -54,7 +54,6 @@ LIKELY = {
 #: Compared without a verdict, with the reason in the text.
 UNJUDGED = {"SE-Svb": (), "US-Prr": ("ground heat",)}
 SENSOR_DEPTH_M = 0.19  # at US-Prr, below the surface: 0.14 m of moss above the sensors' zero (Ikawa et al. 2024), 0.05
-WATER_DENSITY = 1000.0  # kg m-3
 
 
 @dataclass(frozen=True)
@@ -93,12 +92,12 @@ def poker_flat_days(repeats: int, stand=tower_stands.US_PRR, measured_spring: bo
 
 def temperature_in_moss(modelled: pd.DataFrame, depth: float) -> pd.Series:
     """Modelled temperature [degC] at a depth [m] in the organic layer: from the top of the mineral soil up, with the
-    day's ground heat and the layer's conductivity (`sim.solve.conductances`)."""
+    day's ground heat and the layer's conductivity (`sim.soil.soil_conductances`)."""
     freezing = CONSTANTS["soil_freezing_range_k"].low
     thawed, frozen = (CONSTANTS[f"organic_conductivity_{state}"].low for state in ("thawed", "frozen"))
     middle = 0.5 * (modelled["ground_temperature_c"] + modelled["surface_soil_temperature_c"])
     conductivity = thawed + (frozen - thawed) * (-middle / freezing).clip(0.0, 1.0)
-    heat = modelled["ground_heat_mj_m2"] / tower_comparison.MJ_PER_DAY
+    heat = modelled["ground_heat_mj_m2"] / MJ_PER_DAY
     above = modelled["organic_layer_m"] - depth
     return modelled["soil_top_temperature_c"] + heat * above / conductivity
 
@@ -154,7 +153,7 @@ def _svartberget_text(comparison: Comparison) -> tuple[str, list[Miss]]:
     melt = tower_comparison.melt_out(comparison.modelled["swe_mm"].to_numpy())
     closed = [tower_comparison.energy_closure(comparison.fluxes, (month,)) for month in SUMMER]
     offset, days = tower_comparison.energy_offset(comparison.fluxes)
-    lost = -comparison.fluxes["ground_heat_w_m2"].sum() * tower_comparison.MJ_PER_DAY
+    lost = -comparison.fluxes["ground_heat_w_m2"].sum() * MJ_PER_DAY
     ground = tower_comparison.climatology(pairs["ground heat"])
     gap = (ground["modelled"] - ground["measured"]) / 12.0
     counts = comparison.fluxes["soil_temperature_c_measured"] >= tower_comparison.MEASURED_SHARE
@@ -166,7 +165,7 @@ year with all four Rn − G exceeds H + LE by {number(offset, 0)} W m⁻² on av
 the latent or the sensible heat. LE/(LE + H) of June to August does not depend on that: measured {number(measured)},
 modelled {number(modelled)}. Of the bias of ground heat, November and December make
 {number(gap[[11, 12]].sum(), 1, sign=True)} W m⁻²: the soil froze in the model in November. The record loses
-{number(lost, 0)} MJ m⁻² in the year, a mean of {number(lost / DAYS / tower_comparison.MJ_PER_DAY, 1)} W m⁻². Soil was
+{number(lost, 0)} MJ m⁻² in the year, a mean of {number(lost / DAYS / MJ_PER_DAY, 1)} W m⁻². Soil was
 measured at 5 cm; the model's is the top of the mineral soil. From
 {counts[counts].index[-1] + pd.Timedelta(days=1):%-d %B} on its record is filled with one value and not compared. The
 record's respiration doubles within days in early August and halves in mid-September, while the soil's temperature does
@@ -188,7 +187,7 @@ gone on day {melt}.
 
 def _poker_flat_text(comparison: Comparison, repeats: int) -> tuple[str, list[Miss]]:
     pairs = comparison.pairs
-    modelled_ground = comparison.modelled["ground_heat_mj_m2"] / tower_comparison.MJ_PER_DAY
+    modelled_ground = comparison.modelled["ground_heat_mj_m2"] / MJ_PER_DAY
     closed = [
         tower_comparison.energy_closure(comparison.fluxes.assign(ground_heat_w_m2=ground), SUMMER)
         for ground in (comparison.fluxes["ground_heat_w_m2"], modelled_ground)
@@ -241,7 +240,7 @@ By month:
 
 def _ground_heat_text(comparison: Comparison, closed: list[float]) -> str:
     """Why measured ground heat has no verdict; closed : closure of the summer with it, and with the modelled one."""
-    measured = tower_comparison.MJ_PER_DAY * comparison.fluxes["ground_heat_w_m2"]
+    measured = MJ_PER_DAY * comparison.fluxes["ground_heat_w_m2"]
     modelled = comparison.modelled["ground_heat_mj_m2"]
     measured, modelled = (days.groupby(days.index.year).sum() for days in (measured, modelled))
     ice = 1e6 * measured / (LATENT_HEAT_FUSION * WATER_DENSITY)
@@ -275,7 +274,7 @@ def _spring_text(spread: Comparison, measured: Comparison) -> str:
     """Spring 2013 with spread and with measured half-hours, and what only that record has: deeper soil and snow."""
     fluxes = towers.daily_fluxes(poker_flat.spring_fluxes())
     soil = fluxes[[f"soil_{depth}_cm_c" for depth in (34, 44, 54)]].mean(axis=1)
-    rows, watts = [], 1.0 / tower_comparison.MJ_PER_DAY
+    rows, watts = [], 1.0 / MJ_PER_DAY
     for label, column, series, factor in (
         ("latent heat [W m-2]", "latent_heat_mj_m2", _mostly_measured(fluxes, "latent_heat_w_m2"), watts),
         ("sensible heat [W m-2]", "sensible_heat_mj_m2", _mostly_measured(fluxes, "sensible_heat_w_m2"), watts),

@@ -11,11 +11,11 @@ from analysis.validation.climate_records import SEASONS, Climate
 from analysis.validation.document import BLACK, BLUE, GREEN, ORANGE, Miss, Part, number
 from analysis.validation.held_stands import KINDS, MONTH, Run, hold
 from sim.parameters import CONSTANTS
+from sim.physical_constants import MJ_PER_DAY
 from sim.state import DAYS
 from sim.weather import snow_share
 
 YEARS = 6
-MJ_PER_DAY = 0.0864
 UNDISTURBED = {"fire": False, "insects": False}
 DAILY = ("air_temperature_c", "precipitation_mm", "shortwave_mj_m2")
 #: ERA-Interim 1989-2014 at US-Prr: mean and first harmonic of daily temperature.

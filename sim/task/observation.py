@@ -152,7 +152,7 @@ class Observed:
 
 STOCK, CHANGE = 200.0, 100.0  # kgC m-2, beyond what a boreal stand can hold or move in a year
 MOST = {"density": len(DENSITY_CHANGES) - 1, "mix": len(CONIFER_MIXES) - 1}  # the last index of each
-OBSERVED_SITE = tuple(sim.SITE_PARAMETERS)
+OBSERVED_SITE = sim.OBSERVED_SITE_PARAMETERS
 
 
 def limits(name: str) -> tuple[float, float]:

@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 from sim import soil
 from sim.demography import AGES
 from sim.jit import uncompiled
+from sim.physical_constants import FREEZING_POINT_K
 from sim.spin_up import soil_node
 from sim.state import PARAMETER_NAMES, STATE
-from sim.weather import FREEZING_POINT_K
 
 temperature = uncompiled(soil.temperature)
 

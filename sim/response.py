@@ -1,0 +1,160 @@
+"""How trunk, ground and soil answer to the canopy within an implicit step: each a line in the canopy's temperature."""
+
+from sim.jit import compiled
+from sim.physical_constants import (
+    AIR_HEAT_CAPACITY,
+    FREEZING_POINT_K,
+    ICE_HEAT_CAPACITY,
+    LATENT_HEAT_FUSION,
+    LATENT_HEAT_SUBLIMATION,
+)
+from sim.radiation import black_body, black_body_slope
+from sim.snow import ground_capacity
+from sim.soil import boundary_temperature, heat_capacity
+
+
+@compiled
+def respond_to_canopy(
+    trunk,
+    trunk_inertia,
+    trunk_canopy,
+    trunk_air,
+    trunk_ground,
+    ground,
+    ground_inertia,
+    ground_air,
+    ground_source,
+    ground_emission,
+    ground_emission_slope,
+    vapour_slope,
+    ground_emissivity,
+    cover,
+    air,
+    surface,
+    surface_inertia,
+    ground_surface,
+    deep,
+    deep_inertia,
+    surface_deep,
+    deep_boundary,
+    boundary,
+):
+    """Answer of trunk, ground and soil to the canopy within an implicit step, from the bottom up.
+
+    Temperatures in degC at the start of the step, inertias (heat capacity / time step) and conductances in
+    W m-2 K-1. Every node's balance is linear (the ground's emission about its old temperature), so each is a line
+    in the temperature of the node above it; what remains is the canopy's own equation.
+    Returns the coefficients (deep_base, deep_by_surface, surface_base, surface_by_ground, trunk_base,
+    trunk_by_canopy, trunk_by_ground, ground_base, ground_by_emission, ground_by_canopy), the ground's stiffness
+    [W m-2 K-1] and its inverse, `yielding`.
+    """
+    yielding = 1.0 / (deep_inertia + deep_boundary + surface_deep)
+    deep_base = (deep_inertia * deep + deep_boundary * boundary) * yielding
+    deep_by_surface = surface_deep * yielding
+
+    yielding = 1.0 / (surface_inertia + ground_surface + surface_deep * (1.0 - deep_by_surface))
+    surface_base = (surface_inertia * surface + surface_deep * deep_base) * yielding
+    surface_by_ground = ground_surface * yielding
+
+    yielding = 1.0 / (trunk_inertia + trunk_canopy + trunk_air + trunk_ground)
+    trunk_base = (trunk_inertia * trunk + trunk_air * air) * yielding
+    trunk_by_canopy = trunk_canopy * yielding
+    trunk_by_ground = trunk_ground * yielding
+
+    # Here too what is known last is added last (see `sim.canopy.canopy_balance`).
+    stiffness = (
+        ground_inertia
+        + ground_emissivity * ground_emission_slope
+        + trunk_ground * (1.0 - trunk_by_ground)
+        + ground_air
+        + vapour_slope
+        + ground_surface * (1.0 - surface_by_ground)
+    )
+    yielding = 1.0 / stiffness
+    ground_base = (
+        ground_inertia * ground
+        - ground_emissivity * (ground_emission - ground_emission_slope * ground)
+        + trunk_ground * trunk_base
+        + (ground_air * air + vapour_slope * ground)
+        + ground_source
+        + ground_surface * surface_base
+    ) * yielding
+    ground_by_emission = ground_emissivity * cover * yielding
+    ground_by_canopy = trunk_ground * trunk_by_canopy * yielding
+    return (
+        deep_base,
+        deep_by_surface,
+        surface_base,
+        surface_by_ground,
+        trunk_base,
+        trunk_by_canopy,
+        trunk_by_ground,
+        ground_base,
+        ground_by_emission,
+        ground_by_canopy,
+        stiffness,
+        yielding,
+    )
+
+
+@compiled
+def answer_to_canopy(b, seconds):
+    """The nodes' answer to the canopy, from their temperatures and conductances at the start of the step."""
+    s, p, w = b.s, b.p, b.w
+    per_second = 1.0 / seconds
+    for i in range(len(s.swe)):
+        exchange = w.air_density[i] * AIR_HEAT_CAPACITY * w.ground_exchange[i]
+        w.ground_conductance[i] = max(exchange, p.minimum_conductance[i])
+        ice = min(s.ground[i], 0.0)
+        surface_capacity = heat_capacity(
+            w.surface[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], p.soil_freezing_range_k[i]
+        )
+        deep_capacity = heat_capacity(
+            w.deep[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], p.soil_freezing_range_k[i]
+        )
+        (
+            w.deep_base[i],
+            w.deep_by_surface[i],
+            w.surface_base[i],
+            w.surface_by_ground[i],
+            w.trunk_base[i],
+            w.trunk_by_canopy[i],
+            w.trunk_by_ground[i],
+            w.ground_base[i],
+            w.ground_by_emission[i],
+            w.ground_by_canopy[i],
+            stiffness,
+            yielding,
+        ) = respond_to_canopy(
+            s.trunk[i],
+            s.trunk_capacity[i] * per_second,
+            w.trunk_canopy[i],
+            w.trunk_air[i],
+            w.trunk_ground[i],
+            s.ground[i],
+            ground_capacity(s.swe[i], p.skin_heat_capacity[i]) * per_second,
+            w.ground_conductance[i],
+            w.ground_sw[i]
+            + p.ground_emissivity[i] * (1.0 - w.longwave_cover[i]) * w.sky[i]
+            - w.ground_latent[i]
+            + w.latent_slope[i] * (ice - s.ground[i]),
+            black_body(s.ground[i] + FREEZING_POINT_K),
+            black_body_slope(s.ground[i] + FREEZING_POINT_K),
+            w.latent_slope[i],
+            p.ground_emissivity[i],
+            w.longwave_cover[i],
+            w.air[i],
+            w.surface[i],
+            per_second * surface_capacity,
+            w.surface_conductance[i],
+            w.deep[i],
+            per_second * deep_capacity,
+            w.deep_conductance[i],
+            w.boundary_conductance[i],
+            boundary_temperature(b, i),
+        )
+        # At 0 degC some snow sublimates and the rest can melt; beyond, its heat capacity and its vapour are gone.
+        sublimating = (w.ground_latent[i] - w.latent_slope[i] * ice) * (seconds / LATENT_HEAT_SUBLIMATION)
+        meltable = s.swe[i] - sublimating if s.swe[i] > 0.0 else 0.0
+        w.melt_span[i] = LATENT_HEAT_FUSION * max(meltable, 0.0) * (per_second * yielding)
+        w.bare_gain[i] = stiffness / (stiffness - ICE_HEAT_CAPACITY * s.swe[i] * per_second - w.latent_slope[i])
