@@ -323,7 +323,7 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
         observations = self._episodes.observations()
         if ended.any():
             indices = np.flatnonzero(ended)
-            for i in indices:
+            for i in map(int, indices):
                 final = {"final_info": self._episodes.final_info(i), "final_obs": observations[i].copy()}
                 infos = self._add_info(infos, final, i)
             nothing = [None] * self.num_envs

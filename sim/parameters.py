@@ -34,16 +34,22 @@ class Parameter:
 
 def _read(table: str) -> dict[str, Parameter]:
     parameters = {}
-    with (files("sim") / table).open(newline="") as rows:
-        for row in csv.DictReader(rows):
-            value = row.pop("value", None)
-            if value is not None:
-                row["low"] = row["high"] = value
-            numbers = {k: float(row[k]) for k in ("low", "high", "physical_low", "physical_high")}
-            observed = row.pop("observed", "no")
-            if observed not in ("yes", "no"):
-                raise ValueError(f"{table}: {row['name']} has observed {observed!r}; yes and no are allowed")
-            parameters[row["name"]] = Parameter(**{**row, **numbers, "observed": observed == "yes"})
+    for row in csv.DictReader((files("sim") / table).read_text(encoding="utf-8").splitlines()):
+        observed = row.get("observed", "no")
+        if observed not in ("yes", "no"):
+            raise ValueError(f"{table}: {row['name']} has observed {observed!r}; yes and no are allowed")
+        parameters[row["name"]] = Parameter(
+            name=row["name"],
+            low=float(row.get("value") or row["low"]),
+            high=float(row.get("value") or row["high"]),
+            physical_low=float(row["physical_low"]),
+            physical_high=float(row["physical_high"]),
+            unit=row["unit"],
+            group=row["group"],
+            source=row["source"],
+            description=row["description"],
+            observed=observed == "yes",
+        )
     return parameters
 
 
@@ -200,13 +206,14 @@ def _lookup(table: dict, kind: str, name):
 def _check_number(name: str, value, parameter: Parameter) -> float:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not math.isfinite(value):
         raise ValueError(f"{name}: a finite number is allowed, got {value!r}")
-    if not parameter.physical_low <= value <= parameter.physical_high:
+    number = float(value)
+    if not parameter.physical_low <= number <= parameter.physical_high:
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
         raise ValueError(
-            f"{name} = {value:g} is outside its physical limits "
+            f"{name} = {number:g} is outside its physical limits "
             f"[{parameter.physical_low:g}, {parameter.physical_high:g}]{unit}"
         )
-    return float(value)
+    return number
 
 
 def check_seed(name: str, seed) -> int:

@@ -81,7 +81,7 @@ def simulate(
     )
     observed, days = None, DAYS
     if forcing is not None:
-        observed, days = check_forcing(forcing, time_step_minutes, years)
+        observed, days = check_forcing(forcing, time_step_minutes, int(years))
     first_weather = None if observed is None else observed[0]
     stand.start(0, [middle_site(site)], [episode_seeds(seed)], {0: check_initial(initial)}, observed=first_weather)
 

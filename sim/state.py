@@ -199,8 +199,8 @@ def block_dtype(lanes: int) -> np.dtype:
     """dtype of a block of stands: records `p` (parameters), `s` (state), `d` (draws), `r` (record), `w` (work)."""
     lane, by_age, by_day = (lanes,), (AGES, lanes), (DAYS, lanes)
     parameters = [(name, "f8", lane) for name in PARAMETER_NAMES]
-    state = [(name, "f8", lane) for name in STATE]
-    state += [("conifer_stems", "f8", by_age), ("deciduous_stems", "f8", by_age)]
+    stems = [(f"{species}_stems", "f8", by_age) for species in ("conifer", "deciduous")]
+    state = [*((name, "f8", lane) for name in STATE), *stems]
     draws = [(name, "f8", by_day if daily else lane) for name, (daily, *_) in DRAWS.items()]
     return np.dtype(
         [

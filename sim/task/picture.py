@@ -302,7 +302,8 @@ def draw_scene(ax, view: View) -> None:
     order = np.argsort(-np.array(distances), kind="stable")
     vertices = np.concatenate([polygons[k] for k in order])
     facecolors = np.concatenate([colours[k] for k in order])
-    ax.add_collection(PolyCollection(vertices, facecolors=facecolors, linewidths=0), autolim=False)
+    crowns = PolyCollection(vertices, facecolors=facecolors, linewidths=0)  # type: ignore[arg-type]  # an array will do
+    ax.add_collection(crowns, autolim=False)
 
 
 # ------------------------------------------------------------------------------------------------------------
@@ -417,7 +418,7 @@ def draw_years(figure, view: View) -> None:
     ]
     pools = [(label, view.with_start(name), colour) for label, name, colour in layers]
     _areas(stocks, years, pools)
-    _frame(stocks, view, "kgC/m²", 0.0, 4.0 * np.ceil(max(sum(pool[1] for pool in pools)) / 4.0))
+    _frame(stocks, view, "kgC/m²", 0.0, 4.0 * np.ceil(np.sum([pool for _, pool, _ in pools], axis=0).max() / 4.0))
 
     for ax, name, colour in zip(returns, view.weights, cycle(RETURNS), strict=False):
         total = np.concatenate([[0.0], np.cumsum(view.history[f"{name}_reward"])])
