@@ -15,9 +15,10 @@ import numpy as np
 import pandas as pd
 
 from analysis import experiments, methods, metrics, paths
+from analysis.experiments import GENERALIST
 from analysis.results import Results
 from analysis.tables import distance_to_best, main_results, single_sites
-from analysis.tables.common import GENERALIST, over_seeds
+from analysis.tables.common import over_seeds
 from cleanrl_style import protocol
 
 PAGES = (
@@ -26,7 +27,6 @@ PAGES = (
     *(f"docs/algorithms/{name}.md" for name in (*methods.TRAINED, "heuristics")),
 )
 SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
-PLANS = {"dense_conifer": "100 conifers a year", "best_constant_mix": "best constant plan of each weight"}
 ENDS = (0.0, 1.0)  # weights
 HEADING = (
     "| {what} | seeds | carbon, weight 0 | weight 1 | thaw, weight 0 | weight 1 | scalarised | scalarised gain "
@@ -109,7 +109,7 @@ def plans(results: Results) -> list[tuple[str, list]]:
     found = main_results.constant_plans(results)
     return [
         (title, found[name, GENERALIST, "default"])
-        for name, title in PLANS.items()
+        for name, (title, _) in main_results.CONSTANT_PLANS.items()
         if found[name, GENERALIST, "default"]
     ]
 

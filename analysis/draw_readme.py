@@ -73,7 +73,9 @@ def save_animation(path: Path, pictures: list[Image.Image]) -> None:
     colours = Image.fromarray(np.concatenate([pictures[0], pictures[-1]])).quantize(256)
     indexed = [picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures]
     durations = [FRAME_MS] * (len(indexed) - 1) + [LAST_FRAME_MS]
-    indexed[0].save(path, save_all=True, append_images=indexed[1:], duration=durations, loop=0, optimize=True)
+    frames = {"save_all": True, "append_images": indexed[1:], "duration": durations, "loop": 0}
+    with protocol.replacing(path) as file:
+        indexed[0].save(file, format="gif", **frames, optimize=True)
 
 
 def main(run_dir: Path | None = None, preference: float = 0.5, images: Path = Path("docs/images")) -> None:
@@ -86,7 +88,8 @@ def main(run_dir: Path | None = None, preference: float = 0.5, images: Path = Pa
     """
     images.mkdir(parents=True, exist_ok=True)
     if run_dir is None:
-        stand().save(images / "stand.png")
+        with protocol.replacing(images / "stand.png") as file:
+            stand().save(file, format="png")
 
         def heuristic(observations, masks, accrued_returns):
             return conifer_restoration.policy(observations, masks)

@@ -10,7 +10,7 @@ from analysis.methods import LEARNERS, METHODS, STRATEGIES
 from analysis.runs import SITE_SPECIFIC, setting
 
 ROOT = Path(__file__).parents[1]
-GENERALIST, ONE_SITE = "boreal-generalist-v0", "boreal-site-specific-v0"
+GENERALIST, BALANCED, ONE_SITE = "boreal-generalist-v0", "boreal-balanced-v0", "boreal-site-specific-v0"
 STUDIES = (
     "constant_plans",
     "training_gains",
@@ -177,7 +177,7 @@ def thaw_formulations(seeds) -> list[Job]:
 
 def balanced(seeds) -> list[Job]:
     """The three methods where both returns vary equally between policies."""
-    env = {"env_id": "boreal-balanced-v0"}
+    env = {"env_id": BALANCED}
     return [Job("balanced", script, env) for script in STRATEGIES] + [
         trained("balanced", script, seed, **env) for seed in seeds_of(5, seeds) for script in LEARNERS
     ]

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
+from analysis.experiments import GENERALIST
 from analysis.paper_claims.claim import (
     LEAST,
     QUARTER,
@@ -23,7 +24,6 @@ from analysis.paper_claims.claim import (
 from analysis.paper_claims.evidence import VARIANCE, difference, first_and_last, mean_of, only, optional, seeds
 from analysis.studies.constant_plans import as_evaluation, best_gains
 from analysis.tables import single_sites
-from analysis.tables.common import GENERALIST
 
 TITLE = "Learning one objective at a time"
 FIXED, SITES = only("main", "fixed"), only("site")

@@ -22,7 +22,7 @@ from analysis.studies import open_loop, stored
 from analysis.studies.measure_balance import where_valid
 from cleanrl_style import protocol
 
-ENVIRONMENTS = ("boreal-generalist-v0", "boreal-balanced-v0")
+ENVIRONMENTS = (experiments.GENERALIST, experiments.BALANCED)
 PLANTING = tuple(range(15, 25))  # +50 and +100, five mixes each
 DENSE_CONIFER = 24
 

@@ -21,11 +21,12 @@ import torch
 
 import boreal_env
 from analysis import metrics, paths
+from analysis.experiments import GENERALIST
 from analysis.studies import open_loop, stored
 from cleanrl_style import eupg_var_lambda as eupg
 from cleanrl_style import protocol
 
-ENV_ID = "boreal-generalist-v0"
+ENV_ID = GENERALIST
 AGENT_SEED = 1
 FIRST_SEED = 1_000_000  # of the episodes: no training's and no evaluation's
 UTILITIES = ("total", "future")  # of the script's --utility

@@ -18,6 +18,7 @@ import pandas as pd
 
 import boreal_env
 from analysis import metrics, results
+from analysis.experiments import GENERALIST
 from analysis.methods import LEARNERS
 from analysis.reduction import EVERY
 from analysis.studies import open_loop, stored
@@ -48,7 +49,7 @@ def play(num_envs: int, seed: int, steps: int, every: int = EVERY) -> pd.DataFra
     rounds = steps // (years * num_envs)
     progress = protocol.Progress(f"{num_envs} environments, seed {seed}", rounds, "rounds")
     nothing = np.full(num_envs, boreal_env.NO_CHANGE)
-    with contextlib.closing(gym.make_vec("boreal-generalist-v0", num_envs=num_envs)) as envs:
+    with contextlib.closing(gym.make_vec(GENERALIST, num_envs=num_envs)) as envs:
         first = seed * protocol.MAX_ENVS
         envs.reset(seed=[first + i for i in range(num_envs)])
         for number in range(1, rounds + 1):

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.experiments import GENERALIST  # noqa: F401
 from cleanrl_style import protocol
 from cleanrl_style.protocol import FLOAT_FORMAT
 

@@ -4,13 +4,16 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.studies.constant_plans import as_evaluation
-from analysis.tables.common import GENERALIST, ROW_COLUMNS, over_seeds, paper, row_of
+from analysis.studies.constant_plans import ENVIRONMENTS, as_evaluation
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 from cleanrl_style.protocol.fronts import evaluation_weights
 
 TITLE = "Main results"
-ENVIRONMENTS = (GENERALIST, "boreal-balanced-v0")
-CONSTANT_PLANS = {"dense_conifer": False, "best_constant_mix": True}
+#: Rows of plans that look at nothing: name -> title, and whether it is the best plan of each weight.
+CONSTANT_PLANS = {
+    "dense_conifer": ("100 conifers a year", False),
+    "best_constant_mix": ("best constant plan of each weight", True),
+}
 COLUMNS = ROW_COLUMNS | {
     "scalarized": "scalarised",
     "paper_scalarized": "scalarised (paper)",
@@ -109,7 +112,7 @@ def constant_plans(results) -> dict[tuple, list]:
     plans = results.study("constant_plans")
     rows = {}
     for env_id in ENVIRONMENTS:
-        for name, best in CONSTANT_PLANS.items():
+        for name, (_, best) in CONSTANT_PLANS.items():
             key = name, env_id, "default"
             rows[key] = []
             if plans is not None:
