@@ -69,40 +69,55 @@ def note_sums(b, row):
 
 
 @compiled
-def add_step(b, seconds):
-    """Add the step's fluxes and temperatures to the account."""
+def total_sensible(heat) -> float:
+    """Sensible heat to the air [W m-2], of a `sim.fluxes.Heat`."""
+    return heat.canopy_to_air + heat.trunk_to_air + heat.ground_to_air
+
+
+@compiled
+def total_vapour(b, i, vapour) -> float:
+    """All vapour of a step [mm], of a `sim.fluxes.Vapour` and of the canopy's snow."""
+    return vapour.leaves + vapour.wet_canopy + vapour.snow + vapour.soil + b.w.canopy_sublimation[i]
+
+
+@compiled
+def add_step(b, i, net_radiation, heat, vapour, excess, carried, seconds):
+    """Add the step's fluxes and temperatures of a lane to the account.
+
+    heat, vapour : `sim.fluxes.Heat` and `Vapour`; excess : runoff [mm]; carried : heat of snow that sublimated [J m-2].
+    """
     s, w, r = b.s, b.w, b.r
-    for i in range(len(s.swe)):
-        sublimated = w.sublimated[i] + w.canopy_sublimation[i]
-        r.precipitation_mm[i] += w.precipitation_step[i]
-        r.snowfall_mm[i] += w.snow[i]
-        r.evapotranspiration_mm[i] += w.vapour_lost[i]
-        r.transpiration_mm[i] += w.transpired[i]
-        r.sublimation_mm[i] += sublimated
-        r.canopy_sublimation_mm[i] += w.canopy_sublimation[i]
-        r.runoff_mm[i] += w.runoff[i]
-        r.shortwave_mj_m2[i] += 1e-6 * seconds * w.shortwave[i]
-        r.net_radiation_mj_m2[i] += 1e-6 * seconds * w.net_stand[i]
-        r.sensible_heat_mj_m2[i] += 1e-6 * seconds * w.sensible[i]
-        r.latent_heat_mj_m2[i] += 1e-6 * (LATENT_HEAT_VAPORISATION * w.vapour_lost[i] + LATENT_HEAT_FUSION * sublimated)
-        r.ground_shortwave_mj_m2[i] += 1e-6 * seconds * w.ground_sw[i]
-        r.boundary_warming_mj_m2[i] += 1e-6 * seconds * max(w.deep_to_boundary[i], 0.0)
-        r.boundary_cooling_mj_m2[i] += 1e-6 * seconds * max(-w.deep_to_boundary[i], 0.0)
-        r.snow_heat_mj_m2[i] += 1e-6 * (w.advected[i] - w.carried[i])
-        r.deep_heat_gain_mj_m2[i] += 1e-6 * seconds * (w.surface_to_deep[i] - w.deep_to_boundary[i])
-        w.reflected_sum[i] += w.reflected[i]
-        w.shortwave_sum[i] += w.shortwave[i]
-        w.soil_heat_sum[i] += 1e-6 * seconds * w.ground_to_surface[i]
-        w.thaw_warmth[i] += seconds * max(s.ground[i], 0.0)
-        # A melting snowpack is at 0 degC but for round-off.
-        w.thaw_seconds[i] += seconds if s.ground[i] > 1e-6 else 0.0
-        w.air_sum[i] += w.air[i]
-        w.canopy_sum[i] += s.canopy[i]
-        w.ground_sum[i] += s.ground[i]
-        w.top_sum[i] += w.soil_top[i]
-        w.surface_sum[i] += w.surface[i]
-        w.deep_sum[i] += w.deep[i]
-        r.canopy_residual_w_m2[i] = max(r.canopy_residual_w_m2[i], abs(w.residual[i]))
+    all_vapour = total_vapour(b, i, vapour)
+    sublimated = vapour.snow + w.canopy_sublimation[i]
+    r.precipitation_mm[i] += w.precipitation_step[i]
+    r.snowfall_mm[i] += w.snow[i]
+    r.evapotranspiration_mm[i] += all_vapour
+    r.transpiration_mm[i] += vapour.leaves
+    r.sublimation_mm[i] += sublimated
+    r.canopy_sublimation_mm[i] += w.canopy_sublimation[i]
+    r.runoff_mm[i] += excess
+    r.shortwave_mj_m2[i] += 1e-6 * seconds * w.shortwave[i]
+    r.net_radiation_mj_m2[i] += 1e-6 * seconds * net_radiation
+    r.sensible_heat_mj_m2[i] += 1e-6 * seconds * total_sensible(heat)
+    r.latent_heat_mj_m2[i] += 1e-6 * (LATENT_HEAT_VAPORISATION * all_vapour + LATENT_HEAT_FUSION * sublimated)
+    r.ground_shortwave_mj_m2[i] += 1e-6 * seconds * w.ground_sw[i]
+    r.boundary_warming_mj_m2[i] += 1e-6 * seconds * max(heat.deep_to_boundary, 0.0)
+    r.boundary_cooling_mj_m2[i] += 1e-6 * seconds * max(-heat.deep_to_boundary, 0.0)
+    r.snow_heat_mj_m2[i] += 1e-6 * (w.advected[i] - carried)
+    r.deep_heat_gain_mj_m2[i] += 1e-6 * seconds * (heat.surface_to_deep - heat.deep_to_boundary)
+    w.reflected_sum[i] += w.reflected[i]
+    w.shortwave_sum[i] += w.shortwave[i]
+    w.soil_heat_sum[i] += 1e-6 * seconds * heat.ground_to_surface
+    w.thaw_warmth[i] += seconds * max(s.ground[i], 0.0)
+    # A melting snowpack is at 0 degC but for round-off.
+    w.thaw_seconds[i] += seconds if s.ground[i] > 1e-6 else 0.0
+    w.air_sum[i] += w.air[i]
+    w.canopy_sum[i] += s.canopy[i]
+    w.ground_sum[i] += s.ground[i]
+    w.top_sum[i] += w.soil_top[i]
+    w.surface_sum[i] += w.surface[i]
+    w.deep_sum[i] += w.deep[i]
+    r.canopy_residual_w_m2[i] = max(r.canopy_residual_w_m2[i], abs(w.residual[i]))
 
 
 @phase

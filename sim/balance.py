@@ -26,11 +26,10 @@ def stored_water(b, i) -> float:
 
 
 @compiled
-def stores_before(b):
-    """What is stored before the step."""
-    for i in range(len(b.s.swe)):
-        b.w.energy_before[i] = stored_energy(b, i)
-        b.w.water_before[i] = stored_water(b, i)
+def note_stores(b, i):
+    """What is stored in a lane before the step."""
+    b.w.energy_before[i] = stored_energy(b, i)
+    b.w.water_before[i] = stored_water(b, i)
 
 
 @compiled

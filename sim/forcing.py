@@ -229,14 +229,13 @@ def observed_air(b, row, cos_hour):
 
 
 @compiled
-def moisture(b):
+def moisture(b, i):
     """Humidity of the step's air, and its precipitation as rain and snow."""
     w = b.w
-    for i in range(len(b.s.swe)):
-        saturation = saturation_pressure(w.air[i])
-        w.saturation_slope[i] = saturation_slope(w.air[i], saturation)
-        # The vapour of the day's mean is more than a cold night's air can hold: the rest is dew and fog, not followed.
-        w.humidity[i] = min(w.vapour[i], saturation)
-        w.deficit[i] = saturation - w.humidity[i]
-        w.snow[i] = w.precipitation_step[i] * snow_share(w.air[i])
-        w.rain[i] = w.precipitation_step[i] - w.snow[i]
+    saturation = saturation_pressure(w.air[i])
+    w.saturation_slope[i] = saturation_slope(w.air[i], saturation)
+    # The vapour of the day's mean is more than a cold night's air can hold: the rest is dew and fog, not followed.
+    w.humidity[i] = min(w.vapour[i], saturation)
+    w.deficit[i] = saturation - w.humidity[i]
+    w.snow[i] = w.precipitation_step[i] * snow_share(w.air[i])
+    w.rain[i] = w.precipitation_step[i] - w.snow[i]

@@ -4,8 +4,7 @@ Fluxes are computed once, at the temperatures of an implicit step, and then move
 the stores alone that nothing was lost.
 """
 
-from sim.account import add_step
-from sim.balance import balance, stores_before
+from sim.balance import balance, note_stores
 from sim.canopy import solve_canopy
 from sim.carbon import move_carbon
 from sim.evaporation import evaporation, snow_vapour
@@ -24,9 +23,7 @@ from sim.wind import ground_exchange
 @compiled
 def simulate_step(b, seconds):
     """Advance a block by one step of `seconds`, in the weather that `sim.forcing.step_weather` has left in it."""
-    stores_before(b)
-    moisture(b)
-    drought_stress(b, seconds)
+    begin_step(b, seconds)
     if any_sun(b):
         sunlight(b)
     else:
@@ -46,5 +43,13 @@ def simulate_step(b, seconds):
     solve_canopy(b)
     move_heat_and_water(b, seconds)
     move_carbon(b, seconds)
-    add_step(b, seconds)
     balance(b, seconds)
+
+
+@compiled
+def begin_step(b, seconds):
+    """The stores before the step; its air and its soil's moisture."""
+    for i in range(len(b.s.swe)):
+        note_stores(b, i)
+        moisture(b, i)
+        drought_stress(b, i, seconds)

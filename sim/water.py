@@ -21,10 +21,7 @@ def runoff(water, capacity) -> float:
 
 
 @compiled
-def drought_stress(b, seconds):
+def drought_stress(b, i, seconds):
     """Stress by dry soil of the step."""
-    s, p, w = b.s, b.p, b.w
-    for i in range(len(s.swe)):
-        w.water_stress[i] = water_stress(
-            s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds
-        )
+    s, p = b.s, b.p
+    b.w.water_stress[i] = water_stress(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds)

@@ -87,4 +87,4 @@ def test_the_profile_has_the_phases_of_a_step_in_its_order():
     blocks, *_ = profile_kernel.blocks_at({"summer noon": (0, 24)}, 1)["summer noon"]
     called = [name for name, _ in profile_kernel.calls_of_step(blocks)]
     assert called == [name for name in names if name in called]
-    assert {"stores_before", "any_sun", "any_snow", "solve_canopy", "balance"} <= set(called) < set(names)
+    assert {"begin_step", "any_sun", "any_snow", "solve_canopy", "balance"} <= set(called) < set(names)
