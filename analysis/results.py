@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import experiments, methods, metrics, paths, reduction, runs
-from analysis.studies import stored
+from analysis import experiments, methods, metrics, paths, reduction, runs, stored
 
 PAIR = ["carbon", "thaw"]  # the paper's objectives
 

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from tiny_runs import TINY_RUNS, write_run
 
-from analysis import claims, experiments
+from analysis import claims, experiments, stored
 from analysis.paper_claims import asymmetry, curriculum, environment, paper_itself, performance, preference, speed
 from analysis.paper_claims.claim import (
     CONTRADICTS,
@@ -30,7 +30,6 @@ from analysis.paper_claims.claim import (
 )
 from analysis.paper_claims.evidence import Evidence
 from analysis.results import Results
-from analysis.studies import stored
 from analysis.studies.constant_plans import PLANTING
 from analysis.studies.mechanism_pairs import MEANS, OFF, PAIRS
 

@@ -7,9 +7,9 @@ from tiny_runs import write_run
 
 import boreal_env
 import sim
-from analysis import experiments
+from analysis import experiments, stored
 from analysis.results import Results
-from analysis.studies import distance_to_best, open_loop, stored
+from analysis.studies import distance_to_best, open_loop
 from analysis.studies.distance_to_best import BEST_OF_ALL, BEST_OF_SITE, GAINS
 from analysis.tables import distance_to_best as share_table
 

@@ -3,7 +3,8 @@ import pandas as pd
 import pytest
 from scripts import run_script
 
-from analysis.studies import draw_conflict, fronts, nsga2, open_loop, stored
+from analysis import stored
+from analysis.studies import draw_conflict, fronts, nsga2, open_loop
 
 TINY = nsga2.Budget(population=8, generations=2, weathers=1, report_weathers=2)
 

@@ -8,9 +8,8 @@ import pytest
 from tiny_runs import TINY_RUNS, write_run, write_run_of_three
 
 import boreal_env
-from analysis import archive, experiments, make_tables, paths
+from analysis import archive, experiments, make_tables, paths, stored
 from analysis.results import Results
-from analysis.studies import stored
 from analysis.studies.signal_to_noise import CONTRASTS
 from analysis.tables import (
     curriculum_selection,

@@ -3,7 +3,8 @@ import pandas as pd
 import pytest
 from scripts import run_script
 
-from analysis.studies import constant_plans, mechanism_pairs, site_warming, stored
+from analysis import stored
+from analysis.studies import constant_plans, mechanism_pairs, site_warming
 from cleanrl_style.protocol.fronts import evaluation_weights
 
 

@@ -3,7 +3,8 @@ import pandas as pd
 import pytest
 
 import sim
-from analysis.studies import open_loop, signal_to_noise, stored
+from analysis import stored
+from analysis.studies import open_loop, signal_to_noise
 from analysis.studies.signal_to_noise import Design
 
 TINY = Design(sites=2, pasts=2, futures=2, years=(0, 2))

@@ -4,7 +4,8 @@ import pytest
 from scripts import run_script
 
 import sim
-from analysis.studies import open_loop, stored, variance
+from analysis import stored
+from analysis.studies import open_loop, variance
 
 SITE = open_loop.FIRST_SITE_SEED + 2
 

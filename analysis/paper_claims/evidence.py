@@ -5,11 +5,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis import metrics
+from analysis import metrics, stored
 from analysis.experiments import Job
 from analysis.paper_claims.claim import SEEDS, Missing, Number
 from analysis.results import Replicate, Results
-from analysis.studies import stored
 from analysis.tables.common import over_seeds
 from analysis.tables.main_results import run_metrics
 

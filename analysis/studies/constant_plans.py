@@ -16,9 +16,9 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import experiments, metrics, paths
+from analysis import experiments, metrics, paths, stored
 from analysis.reduction import PRIMARY
-from analysis.studies import open_loop, stored
+from analysis.studies import open_loop
 from analysis.studies.measure_balance import where_valid
 from cleanrl_style import protocol
 

@@ -24,9 +24,9 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import experiments, methods, metrics, paths, runs
+from analysis import experiments, methods, metrics, paths, runs, stored
 from analysis.reduction import PRIMARY
-from analysis.studies import open_loop, stored
+from analysis.studies import open_loop
 from analysis.studies.open_loop import GAINS, RETURNS, with_gains
 from cleanrl_style import protocol
 from cleanrl_style.protocol import evaluation

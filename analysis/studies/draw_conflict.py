@@ -13,7 +13,8 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from analysis.studies import open_loop, stored
+from analysis import stored
+from analysis.studies import open_loop
 from analysis.studies.fronts import ALL_ON, GAINS, YEARS, path_of, plan_means, with_gains
 from cleanrl_style import protocol
 

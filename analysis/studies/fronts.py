@@ -16,9 +16,9 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import paths
+from analysis import paths, stored
 from analysis.metrics import hypervolume
-from analysis.studies import nsga2, open_loop, stored
+from analysis.studies import nsga2, open_loop
 from analysis.studies.nsga2 import Budget
 from analysis.studies.open_loop import GAINS, RETURNS, with_gains
 from cleanrl_style import protocol

@@ -20,9 +20,9 @@ import pandas as pd
 import torch
 
 import boreal_env
-from analysis import metrics, paths
+from analysis import metrics, paths, stored
 from analysis.experiments import GENERALIST
-from analysis.studies import open_loop, stored
+from analysis.studies import open_loop
 from cleanrl_style import eupg_var_lambda as eupg
 from cleanrl_style import protocol
 

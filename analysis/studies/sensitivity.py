@@ -18,7 +18,8 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis.studies import open_loop, stored
+from analysis import stored
+from analysis.studies import open_loop
 from cleanrl_style import protocol
 from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.stands import available_cores

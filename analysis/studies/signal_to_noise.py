@@ -18,8 +18,8 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import paths
-from analysis.studies import open_loop, stored
+from analysis import paths, stored
+from analysis.studies import open_loop
 from cleanrl_style import protocol
 
 YEARS = 50

@@ -14,8 +14,8 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis import results
-from analysis.studies import open_loop, stored
+from analysis import results, stored
+from analysis.studies import open_loop
 from cleanrl_style import protocol
 
 YEARS = 50

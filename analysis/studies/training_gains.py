@@ -17,11 +17,11 @@ import numpy as np
 import pandas as pd
 
 import boreal_env
-from analysis import metrics, results
+from analysis import metrics, results, stored
 from analysis.experiments import GENERALIST
 from analysis.methods import LEARNERS
 from analysis.reduction import EVERY
-from analysis.studies import open_loop, stored
+from analysis.studies import open_loop
 from cleanrl_style import protocol
 
 STREAM = ["num_envs", "seed"]  # what fixes the episodes of a training in generalist mode

@@ -17,8 +17,8 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import paths
-from analysis.studies import open_loop, stored
+from analysis import paths, stored
+from analysis.studies import open_loop
 from cleanrl_style import protocol
 
 YEARS = 50

@@ -5,8 +5,8 @@ From analysis/studies/distance_to_best.py; docs/learning.md says how to read it.
 
 import pandas as pd
 
+from analysis import stored
 from analysis.experiments import WEIGHTS
-from analysis.studies import stored
 from analysis.studies.distance_to_best import TEXT
 from analysis.tables.common import ROW_COLUMNS, over_seeds
 

@@ -6,7 +6,7 @@ From variance.py, signal_to_noise.py and gradient_noise.py of analysis/studies; 
 import numpy as np
 import pandas as pd
 
-from analysis.studies import stored
+from analysis import stored
 from analysis.studies.open_loop import OBJECTIVES
 from analysis.studies.signal_to_noise import CONTRASTS, EVERY, UNIFORM, YEARS, episodes_needed
 

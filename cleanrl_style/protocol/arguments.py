@@ -105,14 +105,16 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
             fail(f"--hide-site: --env-id {args.env_id} observes no site parameters")
     task = ask(args.env_id, **env_kwargs)
     if preference is not None:
-        task = _checked("--preference", task.with_preference, preference)
+        with refusing("--preference"):
+            task = task.with_preference(preference)
     lockstep = getattr(args, "vectorization", "async") == "lockstep"
     if lockstep and not task.has_lockstep:
         fail(f"--vectorization lockstep: {args.env_id} has no vector entry point; async has no need of one")
     if lockstep and preference is not None and not task.boreal:
         fail(f"--vectorization lockstep: --env-id {args.env_id} cannot keep a --preference so; async has no need of it")
 
-    weights = [tuple(_checked("--eval-weights", task.check_weights, value)) for value in args.eval_weights]
+    with refusing("--eval-weights"):
+        weights = [tuple(task.check_weights(value)) for value in args.eval_weights]
     if not weights or len(set(weights)) < len(weights):
         fail("--eval-weights must name at least one weight, and none twice")
     if hasattr(args, "rollout_steps") and args.rollout_steps % args.num_envs:
@@ -185,9 +187,10 @@ def not_default(args) -> dict:
     return changed
 
 
-def _checked(flag: str, check, value):
-    """check(value), whose ValueError ends the script, under the flag's name."""
+@contextlib.contextmanager
+def refusing(flag: str):
+    """A ValueError in the block ends the script, under the flag's name."""
     try:
-        return check(value)
+        yield
     except ValueError as error:
         fail(f"{flag}: {str(error).removeprefix('preference: ')}")
