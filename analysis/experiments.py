@@ -8,6 +8,7 @@ from typing import NamedTuple
 from analysis import paths
 from analysis.methods import LEARNERS, METHODS, STRATEGIES
 from analysis.runs import SITE_SPECIFIC, setting
+from cleanrl_style.protocol.arguments import DEFAULT_STEPS
 
 ROOT = Path(__file__).parents[1]
 GENERALIST, BALANCED, ONE_SITE = "boreal-generalist-v0", "boreal-balanced-v0", "boreal-site-specific-v0"
@@ -26,7 +27,6 @@ SITE_SEEDS = (1, 2, 3, 4, 5)
 # Three of the twelve sites of results/fronts: a typical one, one where the carbon end of the front costs thaw, and one
 # of weak wind, where planting costs it and thinning does not.
 FRONT_SITES = (3_000_000_078, 3_000_000_210, 3_000_000_058)
-DEFAULT_STEPS = {"generalist": 300_000, SITE_SPECIFIC: 100_000}
 # analysis/studies/measure_balance.py: both returns vary equally between policies at a carbon scale of 1.4 kgC m-2 yr-1;
 # the paper's rewards are at 2.0, so the carbon reward times 2.0 / 1.4
 REWARD_SCALES = (1.43, 1.0)

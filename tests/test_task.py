@@ -61,6 +61,13 @@ def test_masks_are_the_environments_own(env_id):
     np.testing.assert_array_equal(task.action_masks(envs, observations), expected)
 
 
+def test_an_observation_without_the_preference_is_for_a_fixed_one_alone(tmp_path):
+    gym.register("no-preference-v0", entry_point="boreal_env:BorealEnv", kwargs={"observation_groups": ("state",)})
+    assert not protocol.Task.of("no-preference-v0").observes_preference
+    with pytest.raises(SystemExit, match="its observation lacks the preference"):
+        run_script("cleanrl_style/ppo_gated.py", "--env-id", "no-preference-v0", "--run-dir", tmp_path / "run")
+
+
 def test_objectives_have_names():
     assert protocol.Task.of("toy_env:toy-three-v0").objectives == ("carbon", "thaw", "variety")
 

@@ -16,6 +16,7 @@ from cleanrl_style.protocol.fronts import evaluation_weights
 from cleanrl_style.protocol.task import Task
 
 MAX_ENVS = 1000
+DEFAULT_STEPS = {"generalist": 300_000, "site-specific": 100_000}  # of a training, by the environment's mode
 # Arguments that change nothing in what a run computes.
 FREE_ARGUMENTS = ("run_dir", "overwrite", "track", "wandb_project_name")
 
@@ -104,6 +105,8 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
         if not registered.boreal or not registered.site_entries:
             fail(f"--hide-site: --env-id {args.env_id} observes no site parameters")
     task = ask(args.env_id, **env_kwargs)
+    if preference is None and hasattr(args, "total_timesteps") and not task.observes_preference:
+        fail(f"--env-id {args.env_id}: its observation lacks the preference; observation_groups must have that group")
     if preference is not None:
         with refusing("--preference"):
             task = task.with_preference(preference)
@@ -161,7 +164,7 @@ def fill_in(args, registered: Task) -> None:
     if args.thaw_formulation is None:
         args.thaw_formulation = registered.thaw_formulation
     if getattr(args, "total_timesteps", 0) is None:
-        args.total_timesteps = 100_000 if args.mode == "site-specific" else 300_000
+        args.total_timesteps = DEFAULT_STEPS[args.mode]
     if getattr(args, "num_envs", 0) is None:
         args.num_envs = 32 if args.vectorization == "lockstep" else 8
     number = registered.num_objectives

@@ -29,6 +29,7 @@ class Task:
     has_lockstep: bool = False
     masks: Callable | None = None  # valid actions as a function of observations; None: the environment is called
     site_entries: tuple[int, ...] = ()  # entries of the observation that are site parameters
+    observes_preference: bool = True  # at the front of the observation, all weights but the last
     preference: np.ndarray | None = field(default=None, compare=False)  # of every training episode; None: drawn
 
     @staticmethod
@@ -37,7 +38,6 @@ class Task:
         env = gym.make(env_id, disable_env_checker=True, **env_kwargs)
         one = env.unwrapped
         objectives = _check_spaces(env)
-        boreal = isinstance(one, boreal_env.BorealEnv)
         names = getattr(one, "observation_names", ())
         if len(env.observation_space.low) == len(boreal_env.OBSERVATION_NAMES):
             names = names or boreal_env.OBSERVATION_NAMES  # laid out like ours, so its last entries are a site
@@ -45,15 +45,21 @@ class Task:
             env_id=env_id,
             env_kwargs=env_kwargs,
             objectives=objectives,
-            mode=getattr(one, "mode", "generalist").replace("_", "-"),
-            thaw_formulation=getattr(one, "thaw_formulation", "asymmetric"),
-            years=getattr(one, "years", None),
-            boreal=boreal,
             has_lockstep=env.spec.vector_entry_point is not None or type(one) is boreal_env.BorealEnv,
-            masks=one.mask_function() if boreal else None,
             site_entries=tuple(i for i, name in enumerate(names) if name.startswith("site_")),
         )
-        if not boreal:
+        if isinstance(one, boreal_env.BorealEnv):
+            front = names[: len(objectives) - 1]
+            task = replace(
+                task,
+                boreal=True,
+                mode=one.mode.replace("_", "-"),
+                thaw_formulation=one.thaw_formulation,
+                years=one.years,
+                masks=one.mask_function(),
+                observes_preference=all(name.startswith("preference") for name in front),
+            )
+        else:
             task._check_behaviour(env)
         env.close()
         return task
