@@ -99,7 +99,7 @@ def test_halves_of_a_record_share_no_day():
 
 def test_cloud_term_of_an_overcast_sky_is_one():
     day = pd.DataFrame({"air_temperature_c": [-10.0], "vapour_pressure_hpa": [2.0]})
-    black = climate_records.black_body(day["air_temperature_c"])
+    black = climate_records.black_body(day["air_temperature_c"] + 273.15)
     clear = climate_records.clear_emissivity(day)
     assert climate_records.cloud_term(day.assign(longwave_w_m2=black)).iloc[0] == pytest.approx(1.0)
     assert climate_records.cloud_term(day.assign(longwave_w_m2=clear * black)).iloc[0] == pytest.approx(0.0)

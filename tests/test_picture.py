@@ -115,7 +115,8 @@ def test_an_animation_has_all_frames_and_colours(tmp_path):
 
 def test_the_policy_of_a_run_is_played(tmp_path):
     agent = ppo_curriculum.Agent(gym.make_vec("boreal-site-specific-v0", num_envs=1))
-    torch.save({"agent": agent.state_dict()}, tmp_path / "checkpoint.pt")
+    saved = {"agent": agent.state_dict(), "arguments": {"num_values": 1}, "observation_shape": (43,)}
+    torch.save(saved, tmp_path / "policy.pt")
     config = {"script": "ppo_curriculum", "arguments": {"env_id": "boreal-site-specific-v0"}}
     (tmp_path / "config.json").write_text(json.dumps(config))
     policy, env_id = draw_readme.trained_policy(tmp_path)
@@ -125,8 +126,8 @@ def test_the_policy_of_a_run_is_played(tmp_path):
     assert policy(np.zeros((2, 43), np.float32), masks, np.zeros((2, 2), np.float32)).tolist() == [3, 24]
 
 
-def test_a_run_without_a_checkpoint_is_refused(tmp_path):
-    with pytest.raises(SystemExit, match="no checkpoint"):
+def test_a_folder_without_a_policy_is_refused(tmp_path):
+    with pytest.raises(SystemExit, match="no config.json"):
         draw_readme.trained_policy(tmp_path)
 
 

@@ -9,7 +9,7 @@ from scripts import run_script
 
 from analysis import make_tables
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts
+from cleanrl_style.protocol import fronts, run_folder
 
 SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
 OBJECTIVES = ["carbon", "thaw", "timber"]
@@ -18,16 +18,17 @@ RETURNS = [f"{name}_return" for name in OBJECTIVES]
 
 
 def train(script, folder, *more):
-    """A training of two checkpoints on the boreal environment with timber."""
-    rollout = ("--rollout-steps", 1024, "--update-epochs", 1) if "ppo" in script else ()
+    """A training of two checkpoints on the boreal environment with timber: 64 episodes of four years."""
+    rollout = ("--rollout-steps", 128) if "ppo" in script else ()
     fixed = ("--preference", 0.25, 0.25, 0.5) if "fixed" in script else ("--eval-weights", 1, 0, 0, 0, 0.5, 0.5)
-    given = ("--env-id", "timber_env:timber-v0", "--vectorization", "lockstep", "--total-timesteps", 4096)
+    given = ("--env-id", "timber_env:timber-v0", "--vectorization", "lockstep", "--total-timesteps", 256)
     run_script(f"cleanrl_style/{script}.py", *given, *rollout, *fixed, "--run-dir", folder, "--eval-episodes", 2, *more)
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_a_third_objective_is_trained_evaluated_resumed_and_tabulated(script, tmp_path, monkeypatch):
     whole, stopped = tmp_path / "runs" / "whole", tmp_path / "stopped"
+    monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 128)
     train(script, whole)
 
     save = protocol.Run.save
@@ -37,10 +38,9 @@ def test_a_third_objective_is_trained_evaluated_resumed_and_tabulated(script, tm
         if run.checkpoint_step:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(protocol.Run, "save", save_once)
-    with pytest.raises(SystemExit):
+    with monkeypatch.context() as once, pytest.raises(SystemExit):
+        once.setattr(protocol.Run, "save", save_once)
         train(script, stopped)
-    monkeypatch.undo()
     assert not (stopped / "evaluation.csv").exists()
     train(script, stopped)
     for name in ("episodes.csv", "updates.csv", "evaluation.csv", "policy.pt", "summary.png"):
@@ -78,7 +78,7 @@ def test_fixed_strategies_are_evaluated_too(script, tmp_path):
 def test_learning_follows_three_weights(tmp_path):
     """On the toy, whose best mixture for each weight is known."""
     corners = (1, 0, 0, 0, 1, 0, 0, 0, 1)
-    given = ("--env-id", "toy_env:toy-three-v0", "--total-timesteps", 24_000, "--num-envs", 4, "--learning-rate", 2e-3)
+    given = ("--env-id", "toy_env:toy-three-v0", "--total-timesteps", 8192, "--num-envs", 2, "--learning-rate", 3e-3)
     run_script(
         "cleanrl_style/ppo_gated.py", *given, "--run-dir", tmp_path, "--eval-episodes", 2, "--eval-weights", *corners
     )
