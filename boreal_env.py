@@ -13,10 +13,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 import sim
-from sim.block import compile_kernels
+from sim.block import compile_kernel, lanes_for
 from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS
 from sim.parameters import check_overrides, check_seed
+from sim.stands import available_cores
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
 from sim.task.checks import check_choice
 from sim.task.episodes import (
@@ -90,7 +91,7 @@ def warm_up(num_envs: int = 1) -> None:
 
     Called before worker processes are forked (with 1: each has one stand), it saves each of them the compilation.
     """
-    compile_kernels(num_envs)
+    compile_kernel(lanes_for(num_envs, available_cores()))
 
 
 class Described:
