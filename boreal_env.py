@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 import sim
-from sim.block import compile_kernel, lanes_for
+from sim.block import kernel, lanes_for
 from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS
 from sim.parameters import check_overrides, check_seed
@@ -91,7 +91,7 @@ def warm_up(num_envs: int = 1) -> None:
 
     Called before worker processes are forked (with 1: each has one stand), it saves each of them the compilation.
     """
-    compile_kernel(lanes_for(num_envs, available_cores()))
+    kernel(lanes_for(num_envs, available_cores()))
 
 
 class Described:

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sim.jit import specialised, uncompiled
+from sim.jit import loops_kept, specialised, uncompiled
 from sim.management import decode
 from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype, daily_dtype
 from sim.year import simulate_year
@@ -109,10 +109,13 @@ def namespace(record):
 
 
 def kernel(lanes: int):
-    """The year kernel for blocks of this many lanes, compiled at its first call or loaded from the disk cache."""
+    """The year kernel for blocks of this many lanes, compiled or loaded from the disk cache when it is first wanted."""
     with _MAKING:
         if lanes not in _MADE:
-            _MADE[lanes] = specialised(simulate_year, f"{lanes}_lanes")
+            made = specialised(simulate_year, f"{lanes}_lanes")
+            with loops_kept():
+                made(np.zeros(1, block_dtype(lanes)), 1, 0, np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes)))
+            _MADE[lanes] = made
         return _MADE[lanes]
 
 
@@ -124,9 +127,3 @@ _MAKING = threading.Lock()  # threads may come together, and numba's cache folde
 def interpreted():
     """The same year as plain Python: the `python` backend."""
     return uncompiled(simulate_year)
-
-
-def compile_kernel(lanes: int) -> None:
-    """Have a kernel ready, so that processes forked later find it."""
-    block = np.zeros(1, block_dtype(lanes))
-    kernel(lanes)(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes)))

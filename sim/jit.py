@@ -11,13 +11,16 @@ of the compiling process, so that kernels for one and for sixteen lanes, compile
 other in a third: each number of lanes gets functions with names of their own.
 """
 
+import contextlib
 import functools
 import hashlib
 import os
 import types
 from pathlib import Path
 
+import llvmlite.binding as llvm
 import numba
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
 
 OPTIONS = {"error_model": "numpy", "nogil": True}
@@ -45,6 +48,18 @@ def specialised(dispatcher: Dispatcher, name: str):
         return numba.njit(**OPTIONS, cache=True)(copy.py_func)
     finally:
         numba.config.CACHE_DIR = previous
+
+
+@contextlib.contextmanager
+def loops_kept():
+    """While it lasts, loops over lanes are not unrolled: LLVM would do so with those of four and of eight before it
+    comes to vectorising them. A setting of all that is compiled in the process, so nothing else is meanwhile."""
+    with global_compiler_lock:
+        llvm.set_option("", "-unroll-full-max-count=3")
+        try:
+            yield
+        finally:
+            llvm.set_option("", f"-unroll-full-max-count={2**32 - 1}")  # its default: no limit
 
 
 def uncompiled(dispatcher: Dispatcher):
