@@ -30,7 +30,7 @@ import sim
 from analysis.machine import machine
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
-from sim.block import KERNELS, kernel
+from sim.block import KERNELS
 from sim.draws import draw_year
 from sim.stands import available_cores
 from sim.state import DAYS
@@ -407,9 +407,7 @@ def main(args: Args) -> None:
     except OSError as error:
         protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
     facts = machine()
-    print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-    for lanes in KERNELS:
-        kernel(lanes)
+    protocol.compile_physics(KERNELS)
     path = args.output_dir / "benchmark.csv"
     table = with_earlier(run(args), path)
     text = markdown(facts, table)

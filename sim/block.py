@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sim.jit import loops_kept, specialised, uncompiled
+from sim.jit import cache_folder, loops_kept, specialised, uncompiled
 from sim.management import decode
 from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype, daily_dtype
 from sim.year import simulate_year
@@ -117,6 +117,11 @@ def kernel(lanes: int):
                 made(np.zeros(1, block_dtype(lanes)), 1, 0, np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes)))
             _MADE[lanes] = made
         return _MADE[lanes]
+
+
+def is_compiled(lanes: int) -> bool:
+    """Whether a kernel is ready in this process or on disk."""
+    return lanes in _MADE or any(cache_folder().rglob(f"*.simulate_year_{lanes}_lanes-*.nbi"))
 
 
 _MADE: dict = {}  # kernels by lanes

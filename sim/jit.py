@@ -15,6 +15,7 @@ import contextlib
 import functools
 import hashlib
 import os
+import sys
 import types
 from pathlib import Path
 
@@ -31,8 +32,9 @@ phase = numba.njit(**OPTIONS)
 
 @functools.cache
 def cache_folder() -> Path:
-    """Folder of the compiled kernels: `$NUMBA_CACHE_DIR` or the user's cache, then a hash of the source."""
-    digest = hashlib.sha256(numba.__version__.encode())
+    """Folder of the compiled kernels: `$NUMBA_CACHE_DIR` or the user's cache, then a hash of all they depend on."""
+    cpu = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
+    digest = hashlib.sha256(repr((numba.__version__, sys.version, cpu)).encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
     user_cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"

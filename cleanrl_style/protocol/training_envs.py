@@ -10,8 +10,10 @@ from functools import partial
 import gymnasium as gym
 import numpy as np
 
-import boreal_env
+from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.task import Task, as_option
+from sim.block import lanes_for
+from sim.stands import available_cores
 
 
 class InWorker(gym.Wrapper):
@@ -80,16 +82,19 @@ def make_env(task: Task, index: int, env_kwargs: dict) -> gym.Env:
         end_process(index)
 
 
-def make_training_envs(task: Task, num_envs: int, vectorization: str, **env_kwargs) -> gym.vector.VectorEnv:
+def make_training_envs(
+    task: Task, num_envs: int, vectorization: str, lanes_later=(), **env_kwargs
+) -> gym.vector.VectorEnv:
     """Environments, each in a process ("async") or all in "lockstep"; episodes restart within the step.
 
+    lanes_later : of kernels that the run needs after its training, compiled meanwhile.
     env_kwargs : arguments of theirs that the evaluation's do not have.
     """
     if task.boreal:
         if task.preference is not None:
             env_kwargs["fixed_preference"] = as_option(task.preference)
-        print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-        boreal_env.warm_up(num_envs if vectorization == "lockstep" else 1)  # before workers are forked
+        lanes = lanes_for(num_envs, available_cores()) if vectorization == "lockstep" else 1
+        compile_physics([lanes, *lanes_later])  # before workers are forked
     if vectorization == "lockstep":
         return task.make_lockstep(num_envs, **env_kwargs)
     make = [partial(make_env, task, i, env_kwargs) for i in range(num_envs)]
