@@ -30,6 +30,7 @@ import sim
 from analysis.machine import machine
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
+from cleanrl_style.protocol.hosts import split
 from sim.block import KERNELS
 from sim.draws import draw_year
 from sim.stands import available_cores
@@ -309,7 +310,8 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
             (f"{kind}: evaluation", "ms per year"): year,
         }
 
-    kinds = {"async": (8, [started(1) for _ in range(8)]), "lockstep": (32, [started(32)])}
+    workers = [started(len(block), threads=1) for block in split(8, available_cores())]
+    kinds = {"async": (8, workers), "lockstep": (32, [started(32)])}
     return [partial(measure, kind, *stands) for kind, stands in kinds.items()]
 
 
