@@ -13,10 +13,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 import sim
-from sim.block import compile_kernels
+from sim.block import kernel, lanes_for
 from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS
 from sim.parameters import check_overrides, check_seed
+from sim.stands import available_cores
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
 from sim.task.checks import check_choice
 from sim.task.episodes import (
@@ -85,20 +86,20 @@ __all__ = [
 ]
 
 
-def warm_up(num_envs: int = 1) -> None:
-    """Compile the physics for `num_envs` stands in lockstep, or load it from the disk cache.
+def warm_up(num_envs: int = 1, threads: int | None = None) -> None:
+    """Compile the physics for `num_envs` stands in lockstep on so many threads, or load it from the disk cache.
 
     Called before worker processes are forked (with 1: each has one stand), it saves each of them the compilation.
     """
-    compile_kernels(num_envs)
+    kernel(lanes_for(num_envs, threads or available_cores()))
 
 
 class Described:
     """What both environments say of themselves."""
 
-    def _describe(self, number: int, arguments: dict) -> None:
+    def _describe(self, number: int, arguments: dict, threads: int | None = None) -> None:
         self._arguments = check_arguments(arguments)
-        self._episodes = Episodes(number, **arguments)
+        self._episodes = Episodes(number, threads=threads, **arguments)
         self.mode: str = self._episodes.mode
         self.years: int = self._episodes.years
         self.site_seed: int | None = self._episodes.site_seed
@@ -267,13 +268,21 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
 
     `group_size` neighbours share site, start, weather and disturbance dice in every episode, not the preference: all
     but that are drawn from the seed of a group's first stand. The options "site" and "reset_mask" have to be the same
-    within a group.
+    within a group. `threads`, one a core by default, share the stands.
     """
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
 
-    def __init__(self, num_envs: int = 1, *, group_size: int = 1, render_mode: str | None = None, **kwargs):
-        EzPickle.__init__(self, num_envs, group_size=group_size, render_mode=render_mode, **kwargs)
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        group_size: int = 1,
+        threads: int | None = None,
+        render_mode: str | None = None,
+        **kwargs,
+    ):
+        EzPickle.__init__(self, num_envs, group_size=group_size, threads=threads, render_mode=render_mode, **kwargs)
         if render_mode is not None:
             raise ValueError(f"render_mode {render_mode!r}: the vector environment draws nothing; None is allowed")
         for name, value in (("num_envs", num_envs), ("group_size", group_size)):
@@ -282,7 +291,7 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
         if num_envs % group_size:
             raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
         self.num_envs, self.group_size = int(num_envs), int(group_size)
-        self._describe(self.num_envs, kwargs)
+        self._describe(self.num_envs, kwargs, threads)
         self.single_observation_space = self._episodes.observation_space
         self.single_action_space = Discrete(NUM_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)

@@ -30,7 +30,8 @@ import sim
 from analysis.machine import machine
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
-from sim.block import HALF, LANES, compile_kernels
+from cleanrl_style.protocol.hosts import split
+from sim.block import KERNELS
 from sim.draws import draw_year
 from sim.stands import available_cores
 from sim.state import DAYS
@@ -309,7 +310,8 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
             (f"{kind}: evaluation", "ms per year"): year,
         }
 
-    kinds = {"async": (8, [started(1) for _ in range(8)]), "lockstep": (32, [started(32)])}
+    workers = [started(len(block), threads=1) for block in split(8, available_cores())]
+    kinds = {"async": (8, workers), "lockstep": (32, [started(32)])}
     return [partial(measure, kind, *stands) for kind, stands in kinds.items()]
 
 
@@ -407,9 +409,7 @@ def main(args: Args) -> None:
     except OSError as error:
         protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
     facts = machine()
-    print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-    for number in (1, HALF, LANES):
-        compile_kernels(number)
+    protocol.compile_physics(KERNELS)
     path = args.output_dir / "benchmark.csv"
     table = with_earlier(run(args), path)
     text = markdown(facts, table)

@@ -28,7 +28,7 @@ from sim.canopy import solve_canopy
 from sim.day import begin_day
 from sim.draws import draw_year
 from sim.forcing import hour_angles, step_weather
-from sim.jit import OPTIONS
+from sim.jit import OPTIONS, loops_kept
 from sim.physical_constants import SECONDS_PER_DAY
 from sim.response import answer_to_canopy
 from sim.state import daily_dtype
@@ -185,7 +185,8 @@ def main(args: Args) -> None:
         protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
     print(", ".join(f"{name} {value}" for name, value in machine().items()))
     print("compiling the phases one by one, half a minute", flush=True)
-    table = where_time_goes(args.lanes, args.repeats)
+    with loops_kept():
+        table = where_time_goes(args.lanes, args.repeats)
     print(f"ns per step and stand, {args.lanes} in lockstep\n" + table.to_string(float_format="%.1f"))
     stands = started(args.lanes, threads=1)
     year = statistics.median(per_step(stands) for _ in range(args.repeats))

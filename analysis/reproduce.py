@@ -14,15 +14,13 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal
 
-import boreal_env
 from analysis import archive, claims, document_results, experiments, make_figures, make_tables, paths, runs
 from cleanrl_style import protocol
+from sim.block import KERNELS
 from sim.stands import available_cores
 
 Experiment = Literal[tuple(experiments.EXPERIMENTS)]
@@ -176,9 +174,7 @@ def main(args: Args) -> None:
     def finished(job):
         return not job.is_study and any(job.made(config) for config in configs)
 
-    print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-    with ProcessPoolExecutor(available_cores(), mp_context=get_context("spawn")) as pool:
-        list(pool.map(boreal_env.warm_up, (32, 8, 1)))
+    protocol.compile_physics(KERNELS)
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(available_cores()))
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

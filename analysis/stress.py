@@ -25,7 +25,7 @@ import pandas as pd
 
 import sim
 from cleanrl_style import protocol
-from sim.block import LANES, compile_kernels
+from sim.block import LANES
 from sim.closure import TOLERANCES
 from sim.demography import AGES
 from sim.management import LARGEST_DENSITY, LEAST_DENSITY
@@ -452,8 +452,7 @@ def main(args: Args) -> None:
         args.output_dir.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
-    print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-    compile_kernels(LANES)
+    protocol.compile_physics([LANES])
     numbers = plan(args.stand_years)
     progress = protocol.Progress("stress", sum(map(planned_years, numbers)), "stand-years")
     began, done, outcomes = perf_counter(), 0, []

@@ -10,40 +10,55 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sim.jit import specialised, uncompiled
+from sim.jit import cache_folder, loops_kept, specialised, uncompiled
 from sim.management import decode
 from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype, daily_dtype
 from sim.year import simulate_year
 
-LANES = 16
-HALF = LANES // 2  # whose year takes two thirds as long as that of all
+KERNELS = (1, 4, 8, 16)  # lanes that there is a kernel for
+LANES = KERNELS[-1]
+FEW = 8  # fewer stands than these go one by one, where each has a thread
 CACHE_LINE = 64  # bytes
 BACKENDS = ("numba", "python")
 
 
-def blocks(number: int) -> list[slice]:
-    """Split stands into calls of the kernel: blocks of sixteen, and what is left over; a few stands go one by one."""
-    if number < HALF:
-        return [slice(k, k + 1) for k in range(number)]
-    return [slice(k, min(k + LANES, number)) for k in range(0, number, LANES)]
+def lanes_for(number: int, threads: int) -> int:
+    """Lanes of the blocks that so many stands are stepped in, such that every thread has its share of them."""
+    if number < FEW and number <= threads:
+        return 1
+    share = math.ceil(number / threads)
+    return min((lanes for lanes in KERNELS[1:] if lanes >= share), default=LANES)
 
 
-def lanes_for(number: int) -> int:
-    """Lanes of the kernel that a block of so many stands runs in."""
-    return 1 if number == 1 else HALF if number <= HALF else LANES
+def blocks(number: int, lanes: int) -> list[slice]:
+    """Split stands into calls of the kernel."""
+    return [slice(k, min(k + lanes, number)) for k in range(0, number, lanes)]
 
 
 def run_block(
-    parameters, state, draws, actions, observed, days, daily, *, steps_per_day, backend, first_cut_age, products_decay
+    lanes,
+    parameters,
+    state,
+    draws,
+    actions,
+    observed,
+    days,
+    daily,
+    *,
+    steps_per_day,
+    backend,
+    first_cut_age,
+    products_decay,
 ):
-    """Run a year; lanes that are left over repeat the last stand.
+    """Run a year of up to `lanes` stands; lanes that are left over repeat the last one.
 
     parameters, state, draws : (stands, fields); actions : (stands,); observed : forcing (days x steps a day, 6) for all
     stands, or None; daily : filled with the daily output (stands, days, columns), or None. Returns the new state and
     the annual record, (stands, fields) each, and touches nothing else.
     """
     number = len(parameters)
-    lanes = lanes_for(number)
+    if backend == "python":
+        lanes = number  # interpreted, an idle lane takes as long as another
     block, rows = filled_block(
         lanes, parameters, state, draws, actions, first_cut_age=first_cut_age, products_decay=products_decay
     )
@@ -94,11 +109,19 @@ def namespace(record):
 
 
 def kernel(lanes: int):
-    """The year kernel for blocks of this many lanes, compiled at its first call or loaded from the disk cache."""
+    """The year kernel for blocks of this many lanes, compiled or loaded from the disk cache when it is first wanted."""
     with _MAKING:
         if lanes not in _MADE:
-            _MADE[lanes] = specialised(simulate_year, f"{lanes}_lanes")
+            made = specialised(simulate_year, f"{lanes}_lanes")
+            with loops_kept():
+                made(np.zeros(1, block_dtype(lanes)), 1, 0, np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes)))
+            _MADE[lanes] = made
         return _MADE[lanes]
+
+
+def is_compiled(lanes: int) -> bool:
+    """Whether a kernel is ready in this process or on disk."""
+    return lanes in _MADE or any(cache_folder().rglob(f"*.simulate_year_{lanes}_lanes-*.nbi"))
 
 
 _MADE: dict = {}  # kernels by lanes
@@ -109,10 +132,3 @@ _MAKING = threading.Lock()  # threads may come together, and numba's cache folde
 def interpreted():
     """The same year as plain Python: the `python` backend."""
     return uncompiled(simulate_year)
-
-
-def compile_kernels(number: int) -> None:
-    """Have the kernels ready that so many stands need, so that processes forked later find them."""
-    for lanes in sorted({lanes_for(b.stop - b.start) for b in blocks(number)}):
-        block = np.zeros(1, block_dtype(lanes))
-        kernel(lanes)(block, 1, 0, np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes)))

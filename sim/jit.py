@@ -11,13 +11,17 @@ of the compiling process, so that kernels for one and for sixteen lanes, compile
 other in a third: each number of lanes gets functions with names of their own.
 """
 
+import contextlib
 import functools
 import hashlib
 import os
+import sys
 import types
 from pathlib import Path
 
+import llvmlite.binding as llvm
 import numba
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
 
 OPTIONS = {"error_model": "numpy", "nogil": True}
@@ -28,8 +32,9 @@ phase = numba.njit(**OPTIONS)
 
 @functools.cache
 def cache_folder() -> Path:
-    """Folder of the compiled kernels: `$NUMBA_CACHE_DIR` or the user's cache, then a hash of the source."""
-    digest = hashlib.sha256(numba.__version__.encode())
+    """Folder of the compiled kernels: `$NUMBA_CACHE_DIR` or the user's cache, then a hash of all they depend on."""
+    cpu = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
+    digest = hashlib.sha256(repr((numba.__version__, sys.version, cpu)).encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
     user_cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -45,6 +50,18 @@ def specialised(dispatcher: Dispatcher, name: str):
         return numba.njit(**OPTIONS, cache=True)(copy.py_func)
     finally:
         numba.config.CACHE_DIR = previous
+
+
+@contextlib.contextmanager
+def loops_kept():
+    """While it lasts, loops over lanes are not unrolled: LLVM would do so with those of four and of eight before it
+    comes to vectorising them. A setting of all that is compiled in the process, so nothing else is meanwhile."""
+    with global_compiler_lock:
+        llvm.set_option("", "-unroll-full-max-count=3")
+        try:
+            yield
+        finally:
+            llvm.set_option("", f"-unroll-full-max-count={2**32 - 1}")  # its default: no limit
 
 
 def uncompiled(dispatcher: Dispatcher):

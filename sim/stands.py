@@ -11,7 +11,7 @@ from numbers import Real
 
 import numpy as np
 
-from sim.block import BACKENDS, blocks, run_block
+from sim.block import BACKENDS, blocks, lanes_for, run_block
 from sim.closure import check_closure
 from sim.demography import AGES, first_ages
 from sim.draws import Seeds, draw_slice, draw_year, restored_generator
@@ -80,7 +80,8 @@ class Stands:
         self.mechanisms = check_mechanisms(mechanisms)
         self.first_cut_age = first_cut_age(harvest_min_class, self.constants)
         self.products_decay = yearly_decay(hwp_half_life_years)
-        self.threads = threads or available_cores()
+        self.threads = available_cores() if threads is None else _positive_integer("threads", threads)
+        self.lanes = lanes_for(self.number, self.threads)
         self._pool = None
 
         self.parameters = np.zeros((self.number, len(PARAMETER_NAMES)))
@@ -212,6 +213,7 @@ class Stands:
         def run(chunk):
             rows = None if daily is None else daily[chunk]
             state[chunk], record[chunk] = run_block(
+                self.lanes,
                 self.parameters[stands[chunk]],
                 self.state[stands[chunk]],
                 draws[chunk],
@@ -225,8 +227,8 @@ class Stands:
                 products_decay=self.products_decay,
             )
 
-        chunks = blocks(len(stands))
-        if len(chunks) == 1 or self.backend == "python":
+        chunks = blocks(len(stands), self.lanes)
+        if min(len(chunks), self.threads) == 1 or self.backend == "python":
             for chunk in chunks:
                 run(chunk)
         else:

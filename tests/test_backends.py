@@ -15,7 +15,7 @@ from sim import block
 from sim.block import kernel
 from sim.state import DAILY_NAMES
 
-NUMBER = 19  # a block of sixteen lanes, and three stands in one of eight
+NUMBER = 19
 MINUTES = 120
 
 
@@ -158,11 +158,22 @@ def test_the_order_of_stands_does_not_matter(lockstep):
     np.testing.assert_array_equal(state, lockstep[1][order])
 
 
-@pytest.mark.parametrize("threads", [1, 3])
-def test_the_number_of_threads_does_not_matter(lockstep, threads):
+@pytest.mark.parametrize(("threads", "lanes"), [(1, 16), (3, 8), (5, 4)])
+def test_the_number_of_threads_does_not_matter(lockstep, threads, lanes):
+    assert sim.Stands(NUMBER, threads=threads).lanes == lanes
     records, state = play(start(threads=threads), range(NUMBER))
     np.testing.assert_array_equal(records, lockstep[0])
     np.testing.assert_array_equal(state, lockstep[1])
+
+
+@pytest.mark.parametrize(
+    ("stands", "threads", "lanes"),
+    [(1, 1, 1), (1, 8, 1), (2, 1, 4), (2, 2, 1), (7, 8, 1), (7, 2, 4), (8, 8, 4), (8, 2, 4), (8, 1, 8)]
+    + [(9, 2, 8), (16, 2, 8), (17, 2, 16), (32, 2, 16), (128, 16, 8), (1000, 2, 16)],
+)
+def test_lanes_give_every_thread_its_share(stands, threads, lanes):
+    assert block.lanes_for(stands, threads) == lanes
+    assert sum(len(range(stands)[part]) for part in block.blocks(stands, lanes)) == stands
 
 
 @pytest.mark.parametrize("parts", [((0, 3), (3, 19)), ((0, 17), (17, 19)), ((0, 9), (9, 18), (18, 19))], ids=str)
@@ -252,7 +263,7 @@ def test_threads_that_come_together_make_one_kernel(monkeypatch):
     def slow(function, name):
         made.append(name)
         time.sleep(0.1)
-        return object()
+        return lambda *arguments: None
 
     monkeypatch.setattr(block, "_MADE", {})
     monkeypatch.setattr(block, "specialised", slow)
@@ -264,9 +275,8 @@ def test_threads_that_come_together_make_one_kernel(monkeypatch):
 def test_kernels_for_other_numbers_of_lanes_have_no_name_in_common():
     """numba names compiled code by counters of the compiling process: cached by two processes, functions of one name
     would be taken for each other in a third that loads two kernels, and give zeros or a crash."""
-    one, eight, sixteen = ({f.py_func.__qualname__ for f in compiled_functions(kernel(lanes))} for lanes in (1, 8, 16))
-    assert len(one) == len(eight) == len(sixteen) > 50
-    assert not one & eight | one & sixteen | eight & sixteen
+    names = [{f.py_func.__qualname__ for f in compiled_functions(kernel(lanes))} for lanes in block.KERNELS]
+    assert len(set.union(*names)) == sum(map(len, names)) > 50 * len(block.KERNELS)
 
 
 def test_a_stand_that_has_not_been_started_is_refused():

@@ -9,6 +9,9 @@ from toy_env import ToyEnv
 
 import boreal_env
 from cleanrl_style import protocol
+from cleanrl_style.protocol import training_envs
+from sim.block import lanes_for
+from sim.stands import available_cores
 
 gym.register("short-v0", entry_point="boreal_env:BorealEnv", kwargs={"years": 3})
 gym.register("own-masks-v0", entry_point="boreal_env:BorealEnv", kwargs={"harvest_min_class": "old", "years": 3})
@@ -25,14 +28,16 @@ def test_ids_of_the_benchmark():
     assert (site_specific.mode, site_specific.site_entries) == ("site-specific", ())
 
 
-def test_an_environment_of_ours_under_another_id_loses_nothing(tmp_path, capsys):
+def test_an_environment_of_ours_under_another_id_loses_nothing(tmp_path, monkeypatch):
     """Annual record, compilation before workers, hidden site, lockstep with a preference: all without the id's help."""
+    compiled = []
+    monkeypatch.setattr(training_envs, "compile_physics", compiled.extend)
     run_script(
         "cleanrl_style/eupg_fixed_lambda.py",
         *("--env-id", "short-v0", "--hide-site", "--vectorization", "lockstep", "--preference", 0.25),
         *("--num-envs", 2, "--total-timesteps", 12, "--eval-episodes", 2, "--run-dir", tmp_path),
     )
-    assert "compiling the physics" in capsys.readouterr().out
+    assert compiled == [lanes_for(2, available_cores())] * 2  # for the training, and for the evaluation
     years = pd.read_csv(tmp_path / "evaluation_years.csv")
     assert years.year.max() == 3 and "biomass_kgc_m2" in set(years.variable)
     episodes = pd.read_csv(tmp_path / "episodes.csv")

@@ -151,6 +151,7 @@ BAD_VECTORS = {
     "two and a half": ((2.5, {}), r"num_envs: .* got 2.5"),
     "group of three in four": ((4, {"group_size": 3}), r"group_size = 3: a divisor of num_envs = 4"),
     "group of none": ((4, {"group_size": 0}), r"group_size: a positive integer is allowed, got 0"),
+    "no threads": ((2, {"threads": 0}), r"threads: a positive integer is allowed, got 0"),
     "drawing": ((4, {"render_mode": "rgb_array"}), r"render_mode 'rgb_array'"),
 }
 

@@ -7,6 +7,7 @@ on `run.make_envs()`, logs rows, saves checkpoints and shows `Progress` meanwhil
 
 from cleanrl_style.protocol.agents import load_agent
 from cleanrl_style.protocol.arguments import LIMITS, MAX_ENVS, fail, make_task, not_default, parse
+from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.evaluation import FIRST_EVALUATION_SEED, POLICIES, evaluate
 from cleanrl_style.protocol.files import replacing
 from cleanrl_style.protocol.fronts import scalarize
@@ -26,6 +27,7 @@ __all__ = [
     "Progress",
     "Run",
     "Task",
+    "compile_physics",
     "evaluate",
     "fail",
     "final_info",

@@ -7,9 +7,12 @@ import numpy as np
 import pandas as pd
 
 import boreal_env
+from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.fronts import return_columns, weight_columns
 from cleanrl_style.protocol.progress import Progress
 from cleanrl_style.protocol.task import Task, as_option, final_info
+from sim.block import lanes_for
+from sim.stands import available_cores
 
 POLICIES = ("greedy", "sampled")
 # Training uses seeds below this one, evaluation from this one on: the same for every method.
@@ -111,6 +114,18 @@ def make_envs(task: Task, num_envs: int) -> gym.vector.VectorEnv:
     return task.make_lockstep(num_envs, **({"record_years": True} if task.boreal else {}))
 
 
+def episodes_by_policy(task: Task, episodes: int, policies=POLICIES) -> dict[str, int]:
+    """Episodes of each weight: a greedy policy in site-specific mode does the same in every one."""
+    return {kind: 1 if kind == "greedy" and task.mode == "site-specific" else episodes for kind in policies}
+
+
+def lanes_of_evaluation(task: Task, weights: int, episodes: int, policies=POLICIES) -> set[int]:
+    """Lanes of the kernels that an evaluation needs, of so many weights."""
+    jobs = [weights * number for number in episodes_by_policy(task, episodes, policies).values()]
+    stands = {size for number in jobs for size in (min(number, CHUNK), number % CHUNK) if size}
+    return {lanes_for(size if task.has_lockstep else 1, available_cores()) for size in stands}
+
+
 def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES):
     """Evaluate a policy: every weight on the same episodes, by its most probable actions and by sampled ones.
 
@@ -120,8 +135,9 @@ def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES):
     and the statistics of the annual record over the episodes of each weight (None if there is no such record).
     """
     weights = [task.check_weights(value) for value in weights]
-    # A greedy policy in site-specific mode does the same in every episode.
-    numbers = {kind: 1 if kind == "greedy" and task.mode == "site-specific" else episodes for kind in policies}
+    numbers = episodes_by_policy(task, episodes, policies)
+    if task.boreal:
+        compile_physics(lanes_of_evaluation(task, len(weights), episodes, policies))
     progress = Progress("evaluation", sum(numbers.values()) * len(weights), "episodes")
     other_formulation = (ASYMMETRIC,) if "thaw" in task.objectives and task.thaw_formulation != "asymmetric" else ()
     rows, years = [], []

@@ -23,6 +23,7 @@ import pandas as pd
 
 from cleanrl_style.protocol import tracking, training_envs
 from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, fail, not_default
+from cleanrl_style.protocol.evaluation import lanes_of_evaluation
 from cleanrl_style.protocol.files import replacing
 from cleanrl_style.protocol.summary import draw_summary, print_table
 from cleanrl_style.protocol.task import Task
@@ -237,7 +238,8 @@ class Run:
     def make_envs(self, **env_kwargs):
         """The vector environment to train on, which ends with the run; env_kwargs : what the evaluation's lack."""
         args = self.args
-        self.envs = training_envs.make_training_envs(self.task, args.num_envs, args.vectorization, **env_kwargs)
+        later = lanes_of_evaluation(self.task, len(args.eval_weights), args.eval_episodes)
+        self.envs = training_envs.make_training_envs(self.task, args.num_envs, args.vectorization, later, **env_kwargs)
         return self.envs
 
     def log(self, table: str, row: dict) -> None:

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.wrappers import OrderEnforcing
 
 import boreal_env
 from cleanrl_style.protocol.fronts import return_columns, scalarize, weight_columns
@@ -26,6 +27,7 @@ class Task:
     thaw_formulation: str = "asymmetric"
     years: int | None = None  # steps of an episode; None if it does not say
     boreal: bool = False  # ours, by whatever id: compiled physics, an annual record, a preference that can be fixed
+    bare: bool = False  # ours itself, in no wrapper that does more than watch the order of calls
     has_lockstep: bool = False
     masks: Callable | None = None  # valid actions as a function of observations; None: the environment is called
     site_entries: tuple[int, ...] = ()  # entries of the observation that are site parameters
@@ -45,6 +47,7 @@ class Task:
             env_id=env_id,
             env_kwargs=env_kwargs,
             objectives=objectives,
+            bare=type(env.env if isinstance(env, OrderEnforcing) else env) is boreal_env.BorealEnv,
             has_lockstep=env.spec.vector_entry_point is not None or type(one) is boreal_env.BorealEnv,
             site_entries=tuple(i for i, name in enumerate(names) if name.startswith("site_")),
         )

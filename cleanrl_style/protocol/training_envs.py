@@ -10,20 +10,23 @@ from functools import partial
 import gymnasium as gym
 import numpy as np
 
-import boreal_env
+from cleanrl_style.protocol.compilation import compile_physics
+from cleanrl_style.protocol.hosts import Block, Streams, split
 from cleanrl_style.protocol.task import Task, as_option
+from sim.block import lanes_for
+from sim.stands import available_cores
 
 
 class InWorker(gym.Wrapper):
-    """An environment in a process of its own, which can be given a preference and a state to continue from.
+    """A worker process's environment, or block of them, that can be given a preference and a state to continue from.
 
     An error ends the process, after its traceback: passing it on through gymnasium would lose the traceback, or
     hang if the error cannot be pickled. Numbers that are not finite are an error.
     """
 
-    def __init__(self, env: gym.Env, index: int, preference=None):
+    def __init__(self, env: gym.Env, worker: int, streams: range, preference=None):
         super().__init__(env)
-        self.index, self.preference = index, preference
+        self.worker, self.streams, self.preference = worker, streams, preference
 
     def reset(self, *, seed=None, options=None):
         """As the environment's; with the fixed preference, if there is one."""
@@ -44,8 +47,8 @@ class InWorker(gym.Wrapper):
         return self._or_end(self.unwrapped.get_state) if hasattr(self.unwrapped, "get_state") else None
 
     def set_states(self, states) -> None:
-        """Continue from this environment's state among those of all."""
-        self._or_end(self.unwrapped.set_state, states[self.index])
+        """Continue from this worker's state among those of all."""
+        self._or_end(self.unwrapped.set_state, states[self.worker])
 
     @staticmethod
     def _finite(function, number, *args, **kwargs):
@@ -60,45 +63,62 @@ class InWorker(gym.Wrapper):
         try:
             return function(*args, **kwargs)
         except Exception:
-            end_process(self.index)
+            end_process(self.streams)
 
 
-def end_process(index: int) -> None:
-    """End the process of an environment, after the traceback of the error that is being handled."""
-    print(f"error in environment {index}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
+def name_of(streams: range) -> str:
+    """Environment 1, environments 0 to 3."""
+    return f"environment {streams[0]}" if len(streams) == 1 else f"environments {streams[0]} to {streams[-1]}"
+
+
+def end_process(streams: range) -> None:
+    """End a worker process, after the traceback of the error that is being handled."""
+    print(f"error in {name_of(streams)}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
     os._exit(1)
 
 
-def make_env(task: Task, index: int, env_kwargs: dict) -> gym.Env:
-    """One environment of an AsyncVectorEnv."""
+def make_env(task: Task, blocks: list[range], worker: int, env_kwargs: dict) -> gym.Env:
+    """The environment of a worker of an AsyncVectorEnv; blocks : the environments that each worker has."""
+    streams = blocks[worker]
     try:
         option = None if task.preference is None or task.boreal else as_option(task.preference)
-        return InWorker(task.make(**env_kwargs), index, option)
+        env = task.make(**env_kwargs)
+        if task.bare:
+            env = Block(env.unwrapped, streams, len(blocks[0]))
+        return InWorker(env, worker, streams, option)
     except Exception:
         if multiprocessing.parent_process() is None:  # AsyncVectorEnv makes one more to look at its spaces
             raise
-        end_process(index)
+        end_process(streams)
 
 
-def make_training_envs(task: Task, num_envs: int, vectorization: str, **env_kwargs) -> gym.vector.VectorEnv:
-    """Environments, each in a process ("async") or all in "lockstep"; episodes restart within the step.
+def make_training_envs(
+    task: Task, num_envs: int, vectorization: str, lanes_later=(), **env_kwargs
+) -> gym.vector.VectorEnv:
+    """Environments, in worker processes ("async") or all in "lockstep"; episodes restart within the step.
 
+    A worker has one environment, or of ours its share of them: no more workers than cores then.
+    lanes_later : of kernels that the run needs after its training, compiled meanwhile.
     env_kwargs : arguments of theirs that the evaluation's do not have.
     """
+    blocks = split(num_envs, available_cores() if task.bare else num_envs)
     if task.boreal:
         if task.preference is not None:
             env_kwargs["fixed_preference"] = as_option(task.preference)
-        print("compiling the physics, or loading it (the first time: up to a minute)", flush=True)
-        boreal_env.warm_up(num_envs if vectorization == "lockstep" else 1)  # before workers are forked
+        shared = [lanes_for(num_envs, available_cores())]
+        apart = [lanes_for(len(streams), 1) for streams in blocks]
+        compile_physics([*(shared if vectorization == "lockstep" else apart), *lanes_later])
     if vectorization == "lockstep":
         return task.make_lockstep(num_envs, **env_kwargs)
-    make = [partial(make_env, task, i, env_kwargs) for i in range(num_envs)]
+    make = [partial(make_env, task, blocks, worker, env_kwargs) for worker in range(len(blocks))]
     # Ctrl-C reaches all processes of a terminal: the workers leave it to the main one, which then ends them
     handlers = {
         number: signal.signal(number, handler)
         for number, handler in ((signal.SIGINT, signal.SIG_IGN), (signal.SIGTERM, signal.SIG_DFL))
     }
     try:
+        if task.bare:
+            return Streams(make, blocks)
         return gym.vector.AsyncVectorEnv(make, autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
     except (EOFError, ConnectionError):
         sys.exit("error: an environment could not be made: its error is above")
@@ -109,7 +129,7 @@ def make_training_envs(task: Task, num_envs: int, vectorization: str, **env_kwar
 
 def get_states(envs: gym.vector.VectorEnv):
     """State of every environment, generators included; None if the environment offers none."""
-    if not isinstance(envs, gym.vector.AsyncVectorEnv):
+    if not isinstance(envs.unwrapped, gym.vector.AsyncVectorEnv):
         return envs.get_state() if hasattr(envs, "get_state") else None
     states = envs.call("get_state")
     return None if None in states else states
@@ -117,7 +137,9 @@ def get_states(envs: gym.vector.VectorEnv):
 
 def set_states(envs: gym.vector.VectorEnv, states) -> None:
     """Continue from `get_states`."""
-    if isinstance(envs, gym.vector.AsyncVectorEnv):
+    if isinstance(envs, Streams):
+        envs.set_states(states)
+    elif isinstance(envs, gym.vector.AsyncVectorEnv):
         envs.call("set_states", states)
     else:
         envs.set_state(states)
@@ -125,15 +147,18 @@ def set_states(envs: gym.vector.VectorEnv, states) -> None:
 
 def end(envs: gym.vector.VectorEnv) -> list[str]:
     """End the environments' processes, whatever they are doing; says which had already ended, and how."""
-    if not isinstance(envs, gym.vector.AsyncVectorEnv) or envs.closed:
+    pool = envs.unwrapped
+    if not isinstance(pool, gym.vector.AsyncVectorEnv) or pool.closed:
         return []
+    blocks = envs.blocks if isinstance(envs, Streams) else split(envs.num_envs, envs.num_envs)
     dead = []
-    for i, process in enumerate(envs.processes):
+    for streams, process in zip(blocks, pool.processes, strict=True):
         process.join(timeout=0.1 if not dead else 0)
         if process.exitcode is not None:
             cause = f"signal {-process.exitcode}" if process.exitcode < 0 else "its error above"
-            dead.append(f"environment {i} was ended by {cause}")
+            worker = name_of(streams) if len(streams) == 1 else f"the worker of {name_of(streams)}"
+            dead.append(f"{worker} was ended by {cause}")
         process.kill()
         process.join()
-    envs.closed = True  # its own close() would wait for answers of the processes
+    pool.closed = True  # its own close() would wait for answers of the processes
     return dead

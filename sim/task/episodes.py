@@ -30,12 +30,13 @@ DEFAULT_YEARS = 50
 
 
 class Episodes:
-    """`number` episodes side by side. Arguments are those of `BorealEnv`, checked here."""
+    """`number` episodes side by side, on `threads` threads. Other arguments are those of `BorealEnv`, checked here."""
 
     def __init__(
         self,
         number,
         *,
+        threads=None,
         mode="generalist",
         years=DEFAULT_YEARS,
         time_step_minutes=30,
@@ -92,6 +93,7 @@ class Episodes:
             mechanisms=mechanisms,
             hwp_half_life_years=hwp_half_life_years,
             harvest_min_class=harvest_min_class,
+            threads=threads,
         )
         self.table = Table(observation_rows(self.objective_names))
         self.masks = MaskFunction(self.table.names, harvest_min_class)
@@ -283,7 +285,7 @@ def check_saved(state: dict, kind: str) -> None:
         raise ValueError(f"state: a dict of {', '.join(keys[kind])} from get_state is allowed, got {got}")
 
 
-ARGUMENTS = tuple(name for name in inspect.signature(Episodes).parameters if name != "number")
+ARGUMENTS = tuple(name for name in inspect.signature(Episodes).parameters if name not in ("number", "threads"))
 
 
 def check_arguments(arguments: dict) -> dict:

@@ -1,0 +1,163 @@
+"""Worker processes that each host several streams of episodes.
+
+A stand costs least beside others: a block of stands in lockstep takes two fifths of the time that they take one by one.
+gymnasium's AsyncVectorEnv knows one environment a worker. So each worker has a `Block` of environments, which passes
+for one, and `Streams` gives a script the environments of all workers side by side, as if each had its own.
+"""
+
+from collections.abc import Callable, Sequence
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from boreal_env import BorealEnv
+
+
+def split(num_envs: int, cores: int) -> list[range]:
+    """Environments of each worker: neighbours, in no more workers than there are cores."""
+    rows = -(-num_envs // cores)
+    return [range(first, min(first + rows, num_envs)) for first in range(0, num_envs, rows)]
+
+
+class Block(gym.Env):
+    """The environments of one worker, in lockstep on one thread.
+
+    Observations, rewards, terminations and truncations have a row for each, and so has the action. AsyncVectorEnv wants
+    one shape of all workers: a block smaller than `rows`, the largest one's, has zeros below.
+    """
+
+    def __init__(self, env: BorealEnv, streams: range, rows: int):
+        """env: one of them; streams: which of all environments these are."""
+        self.envs = env.lockstep(len(streams), threads=1)
+        self.streams, self.rows = streams, rows
+        self.observation_space = batch_space(self.envs.single_observation_space, rows)
+        self.action_space = batch_space(self.envs.single_action_space, rows)
+
+    def reset(self, *, seed=None, options=None):
+        """seed: a list, one for each; options: as for one environment, and a `stream_mask` of all environments."""
+        options = dict(options or {})
+        if "stream_mask" in options:
+            options["reset_mask"] = options.pop("stream_mask")[self.streams]
+        if options.get("reset_mask", np.ones(1)).any():
+            self.observations, _ = self.envs.reset(seed=seed, options=options)
+        return self._filled(self.observations), {}
+
+    def step(self, action):
+        """A step of all; episodes restart within it. The info of each is in a list: info["streams"]."""
+        self.observations, *results, infos = self.envs.step(action[: len(self.streams)])
+        info = {"streams": [info_of(infos, i) for i in range(len(self.streams))]} if infos else {}
+        return *map(self._filled, (self.observations, *results)), info
+
+    def action_masks(self) -> np.ndarray:
+        """Of each environment."""
+        return self.envs.action_masks()
+
+    def get_state(self) -> list[dict]:
+        """Of each environment, as a `BorealEnv` gives it."""
+        state = self.envs.get_state()
+        return [
+            {"episodes": row_of(state["episodes"], i), "generator": generator}
+            for i, generator in enumerate(state["generators"])
+        ]
+
+    def set_state(self, states: Sequence[dict]) -> None:
+        """Continue from `get_state`."""
+        episodes = one_below_another([state["episodes"] for state in states])
+        self.envs.set_state({"episodes": episodes, "generators": [state["generator"] for state in states]})
+
+    def _filled(self, values: np.ndarray) -> np.ndarray:
+        """Values of each environment, and zeros for the rows that are left over."""
+        filled = np.zeros((self.rows, *values.shape[1:]), values.dtype)
+        filled[: len(values)] = values
+        return filled
+
+
+class Streams(gym.vector.VectorWrapper):
+    """All environments of an AsyncVectorEnv whose workers have a `Block` each."""
+
+    env: gym.vector.AsyncVectorEnv
+
+    def __init__(self, make: Sequence[Callable[[], gym.Env]], blocks: Sequence[range]):
+        """make: for each worker, what makes its block; blocks: its environments."""
+        # episodes restart in the block: to AsyncVectorEnv they never end
+        super().__init__(gym.vector.AsyncVectorEnv(make, autoreset_mode=AutoresetMode.DISABLED))
+        self.blocks = blocks
+        self.used = np.concatenate([np.arange(len(block)) + k * len(blocks[0]) for k, block in enumerate(blocks)])
+        one = self.env.single_observation_space
+        self.single_observation_space = gym.spaces.Box(one.low[0], one.high[0], dtype=one.dtype)
+        self.single_action_space = gym.spaces.Discrete(int(self.env.single_action_space.nvec[0]))
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.metadata = {**self.env.metadata, "autoreset_mode": AutoresetMode.SAME_STEP}
+
+    @property
+    def num_envs(self) -> int:
+        """Of all workers."""
+        return len(self.used)
+
+    def reset(self, *, seed=None, options=None):
+        """As AsyncVectorEnv's."""
+        if seed is None or isinstance(seed, (int, np.integer)):
+            seed = [None if seed is None else seed + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"seed: one value or {self.num_envs} are allowed, got {len(seed)}")
+        options = dict(options or {})
+        if "reset_mask" in options:
+            options["stream_mask"] = options.pop("reset_mask")
+        observations, _ = self.env.reset(seed=self._by_worker(seed), options=options)
+        return self._rows(observations), {}
+
+    def step(self, actions):
+        """As AsyncVectorEnv's."""
+        padded = np.zeros(self.env.action_space.shape, self.env.action_space.dtype)
+        padded.reshape(-1)[self.used] = actions
+        *results, of_workers = self.env.step(padded)
+        infos: dict = {}
+        for block, own in zip(self.blocks, of_workers.get("streams", ()), strict=False):
+            for i, info in zip(block, own or (), strict=False):
+                infos = self._add_info(infos, info, i)
+        return *map(self._rows, results), infos
+
+    def call(self, name: str, *args, **kwargs) -> tuple:
+        """Answers of all environments; a `Block` gives a list of its own."""
+        return tuple(answer for own in self.env.call(name, *args, **kwargs) for answer in own)
+
+    def set_states(self, states: Sequence[dict]) -> None:
+        """Continue from the states of all environments, as `call("get_state")` gives them."""
+        self.env.call("set_states", self._by_worker(states))
+
+    def _by_worker(self, values: Sequence) -> list[list]:
+        """What belongs to each environment, as a list for each worker."""
+        return [[values[i] for i in block] for block in self.blocks]
+
+    def _rows(self, values: np.ndarray) -> np.ndarray:
+        """Values (workers, rows, ..) as (environments, ..)."""
+        return values.reshape(-1, *values.shape[2:])[self.used]
+
+
+def info_of(infos: dict, i: int) -> dict:
+    """Environment i's own info, of those that a vector environment has put together."""
+    return {
+        name: info_of(value, i) if isinstance(value, dict) else value[i]
+        for name, value in infos.items()
+        if not name.startswith("_") and infos[f"_{name}"][i]
+    }
+
+
+def row_of(state, i: int):
+    """The state of environment i alone, of a state whose arrays and lists have a row for each."""
+    if isinstance(state, dict):
+        return {name: row_of(value, i) for name, value in state.items()}
+    return state[i : i + 1] if isinstance(state, (np.ndarray, list)) else state
+
+
+def one_below_another(states: Sequence):
+    """The state of several environments, of the states of each: `row_of`'s inverse."""
+    first = states[0]
+    if isinstance(first, dict):
+        return {name: one_below_another([state[name] for state in states]) for name in first}
+    if isinstance(first, np.ndarray):
+        return np.concatenate(states)
+    return sum(states, []) if isinstance(first, list) else first

@@ -1,0 +1,108 @@
+"""Several streams in a worker: to a script, workers with one each."""
+
+import os
+import pickle
+import signal
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode
+from playing import QUICK, assert_same
+
+from cleanrl_style import protocol
+from cleanrl_style.protocol import training_envs
+
+gym.register("quick-v0", entry_point="boreal_env:BorealEnv", kwargs={**QUICK, "record_years": True})
+gym.register("limited-v0", entry_point="boreal_env:BorealEnv", kwargs=QUICK, max_episode_steps=2)
+TASK = protocol.Task.of("quick-v0")
+NUMBER = 8
+ACTIONS = np.random.default_rng(1).integers(0, 25, (10, NUMBER))
+
+
+@pytest.fixture
+def make(monkeypatch):
+    """Environments in workers of so many cores; None: in a worker each, by gymnasium alone."""
+    made = []
+
+    def of_cores(cores, task=TASK):
+        if cores is None:
+            made.append(AsyncVectorEnv([task.make] * NUMBER, autoreset_mode=AutoresetMode.SAME_STEP))
+        else:
+            monkeypatch.setattr(training_envs, "available_cores", lambda: cores)
+            made.append(training_envs.make_training_envs(task, NUMBER, "async"))
+        return made[-1]
+
+    yield of_cores
+    for envs in made:
+        envs.close()
+
+
+def assert_same_steps(envs, others, actions=ACTIONS):
+    for row in actions:
+        for one, other in zip(envs.step(row), others.step(row), strict=True):
+            assert_same(one, other)
+
+
+@pytest.mark.parametrize(("cores", "workers"), [(1, 1), (3, 3), (7, 4), (16, 8)])
+def test_a_script_sees_what_it_sees_of_a_worker_each(make, cores, workers):
+    """Observations, rewards, ends and infos over two episodes, of equal lengths and then of others."""
+    envs, others = make(cores), make(None)
+    assert len(envs.unwrapped.processes) == workers and envs.num_envs == NUMBER
+    for name in ("single_observation_space", "single_action_space", "observation_space", "action_space"):
+        assert getattr(envs, name) == getattr(others, name), name
+    assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    seeds = list(range(50, 50 + NUMBER))
+    assert_same(envs.reset(seed=seeds)[0], others.reset(seed=seeds)[0])
+    assert_same(envs.call("action_masks"), others.call("action_masks"))
+    assert_same_steps(envs, others)
+    for stream in ([1, 6], [7]):
+        mask = np.isin(np.arange(NUMBER), stream)
+        observed, expected = (
+            e.reset(seed=9, options={"preference": 0.5, "reset_mask": mask})[0] for e in (envs, others)
+        )
+        assert_same(observed, expected)
+        assert_same_steps(envs, others, ACTIONS[:3])
+    assert_same(envs.reset(seed=3)[0], others.reset(seed=3)[0])
+    assert_same(envs.reset()[0], others.reset()[0])
+
+
+def test_states_are_of_streams_whatever_the_workers(make):
+    """A run goes on where there are more cores, or fewer."""
+    envs, others, resumed = make(3), make(None), make(2)
+    for one in (envs, others):
+        one.reset(seed=3)
+    assert_same_steps(envs, others, ACTIONS[:2])
+    states = training_envs.get_states(envs)
+    assert pickle.dumps(states[5]) == pickle.dumps(others.call("get_state")[5])
+    assert len(states) == NUMBER
+    training_envs.set_states(resumed, pickle.loads(pickle.dumps(states)))
+    assert_same_steps(resumed, others)
+
+
+def test_a_wrapped_environment_has_a_worker_for_itself(make):
+    assert TASK.bare and not protocol.Task.of("limited-v0").bare
+    envs = make(2, protocol.Task.of("limited-v0"))
+    envs.reset(seed=1)
+    envs.step(ACTIONS[0])
+    assert len(envs.processes) == NUMBER and envs.step(ACTIONS[1])[3].all()
+
+
+def test_an_error_names_the_streams_of_its_worker(make, capfd):
+    envs = make(3)
+    envs.reset(seed=1)
+    with pytest.raises((EOFError, ConnectionError)):
+        envs.step(np.full(NUMBER, 12) + 13 * (np.arange(NUMBER) == 4))
+    assert training_envs.end(envs) == ["the worker of environments 3 to 5 was ended by its error above"]
+    error = capfd.readouterr().err
+    assert "error in environments 3 to 5:" in error and "ValueError: action 25" in error
+
+
+def test_a_killed_worker_is_named(make):
+    envs = make(3)
+    envs.reset(seed=1)
+    os.kill(envs.unwrapped.processes[2].pid, signal.SIGKILL)
+    with pytest.raises((EOFError, ConnectionError)):
+        envs.step(ACTIONS[0])
+    assert training_envs.end(envs) == ["the worker of environments 6 to 7 was ended by signal 9"]
+    assert not any(process.is_alive() for process in envs.unwrapped.processes)
