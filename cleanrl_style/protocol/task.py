@@ -43,12 +43,13 @@ class Task:
         names = getattr(one, "observation_names", ())
         if len(env.observation_space.low) == len(boreal_env.OBSERVATION_NAMES):
             names = names or boreal_env.OBSERVATION_NAMES  # laid out like ours, so its last entries are a site
+        bare = type(env.env if isinstance(env, OrderEnforcing) else env) is boreal_env.BorealEnv
         task = Task(
             env_id=env_id,
             env_kwargs=env_kwargs,
             objectives=objectives,
-            bare=type(env.env if isinstance(env, OrderEnforcing) else env) is boreal_env.BorealEnv,
-            has_lockstep=env.spec.vector_entry_point is not None or type(one) is boreal_env.BorealEnv,
+            bare=bare,
+            has_lockstep=bare or env.spec.vector_entry_point is not None,
             site_entries=tuple(i for i, name in enumerate(names) if name.startswith("site_")),
         )
         if isinstance(one, boreal_env.BorealEnv):
