@@ -48,14 +48,28 @@ class Vapour(NamedTuple):
 def move_heat_and_water(b, seconds):
     """Move a step's heat and water between the stores; what crossed the stand's boundary is noted and accounted for."""
     for i in range(len(b.s.swe)):
-        heat = conduct(b, i)
         net_radiation, ground_longwave = radiate(b, i)
+        heat = conduct(b, i)
         vapour = evaporate(b, i, seconds)
         melted, carried = warm_ground(b, i, ground_longwave, heat, vapour, seconds)
         warm_soil_and_trunk(b, i, heat, seconds)
         excess = fill_soil(b, i, vapour, melted)
         cross_boundary(b, i, net_radiation, heat, vapour, excess, carried, seconds)
         add_step(b, i, net_radiation, heat, vapour, excess, carried, seconds)
+
+
+@compiled
+def radiate(b, i):
+    """Net radiation of the stand, and the longwave that the ground gains."""
+    s, p, w = b.s, b.p, b.w
+    emission = black_body(w.trial[i] + FREEZING_POINT_K)
+    kelvin = s.ground[i] + FREEZING_POINT_K
+    ground_emission = black_body(kelvin) + black_body_slope(kelvin) * (w.ground_new[i] - s.ground[i])
+    down = longwave_down(w.sky[i], emission, w.longwave_cover[i])
+    up = longwave_up(ground_emission, down, p.ground_emissivity[i])
+    to_sky = (1.0 - w.longwave_cover[i]) * up + w.longwave_cover[i] * emission
+    net_radiation = w.shortwave[i] - w.reflected[i] + w.sky[i] - to_sky
+    return net_radiation, p.ground_emissivity[i] * (down - ground_emission)
 
 
 @compiled
@@ -78,20 +92,6 @@ def conduct(b, i):
     )
     w.soil_top[i] = surface + heat.ground_to_surface * w.upper_soil[i]
     return heat
-
-
-@compiled
-def radiate(b, i):
-    """Net radiation of the stand, and the longwave that the ground gains."""
-    s, p, w = b.s, b.p, b.w
-    emission = black_body(w.trial[i] + FREEZING_POINT_K)
-    kelvin = s.ground[i] + FREEZING_POINT_K
-    ground_emission = black_body(kelvin) + black_body_slope(kelvin) * (w.ground_new[i] - s.ground[i])
-    down = longwave_down(w.sky[i], emission, w.longwave_cover[i])
-    up = longwave_up(ground_emission, down, p.ground_emissivity[i])
-    to_sky = (1.0 - w.longwave_cover[i]) * up + w.longwave_cover[i] * emission
-    net_radiation = w.shortwave[i] - w.reflected[i] + w.sky[i] - to_sky
-    return net_radiation, p.ground_emissivity[i] * (down - ground_emission)
 
 
 @compiled

@@ -48,8 +48,8 @@ def simulate_step(b, seconds):
 
 @compiled
 def begin_step(b, seconds):
-    """Moisture of the step's air and soil; what is stored before it."""
+    """The stores before the step; its air and its soil's moisture."""
     for i in range(len(b.s.swe)):
+        note_stores(b, i)
         moisture(b, i)
         drought_stress(b, i, seconds)
-        note_stores(b, i)
