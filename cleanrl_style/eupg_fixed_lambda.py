@@ -38,7 +38,7 @@ class Args:
     num_envs: int = 8
     """number of environments, and of episodes in a batch; 1 is the paper's"""
     vectorization: Literal["async", "lockstep"] = "async"
-    """one process per environment, or all environments in one compiled call"""
+    """environments in worker processes, or all in one compiled call"""
     preference: float | tuple[float, ...] = 0.5
     """carbon weight of every episode, in training and evaluation; of three and more objectives, a weight of each"""
 

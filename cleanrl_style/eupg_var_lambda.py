@@ -38,7 +38,7 @@ class Args:
     num_envs: int = 8
     """number of environments, and of episodes in a batch; 1 is the paper's"""
     vectorization: Literal["async", "lockstep"] = "async"
-    """one process per environment, or all environments in one compiled call"""
+    """environments in worker processes, or all in one compiled call"""
 
     # Algorithm: the paper's hyperparameters
     learning_rate: float = 1e-3

@@ -37,7 +37,7 @@ class Args:
     num_envs: int | None = None
     """number of environments (None: 8 async, 32 lockstep)"""
     vectorization: Literal["async", "lockstep"] = "async"
-    """one process per environment, or all environments in one compiled call"""
+    """environments in worker processes, or all in one compiled call"""
 
     # Algorithm: the paper's hyperparameters; CleanRL's where the paper is silent
     learning_rate: float = 3e-4
