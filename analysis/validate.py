@@ -5,40 +5,51 @@
     python analysis/validate.py --parts towers weather
 
 Held stands on sampled sites against the bands of the literature; two towers, driven by their own weather; the weather
-generator and its calibration; the seasonal course of carbon and water; fire, insects and mortality; a list of what
-misses. Every number of the document is from the run that wrote it.
+generator and its calibration; the seasonal course of carbon and water; fire, insects and mortality; stands that run
+free, against chronosequences; a list of what misses. Every number of the document is from the run that wrote it.
 """
 
 import errno
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
-from analysis.validation import bands, disturbance_report, document, seasonal_fluxes, tower_report, weather_report
+from analysis.validation import (
+    bands,
+    disturbance_report,
+    document,
+    free_report,
+    seasonal_fluxes,
+    tower_report,
+    weather_report,
+)
 from analysis.validation.document import Part
 from cleanrl_style import protocol
 
-QUICK_SITES = 16
+QUICK = {"sites": 16, "free_sites": 2, "tower_repeats": 1}
+FEWEST = {"sites": 1, "free_sites": 1, "tower_repeats": 1}
 FULL_DOCUMENT = Path("docs")
 OTHERWISE = Path("results/validation")
 
-PartName = Literal["bands", "towers", "weather", "seasons", "disturbance"]
+PartName = Literal["bands", "towers", "weather", "seasons", "disturbance", "free"]
 
 
 @dataclass
 class Args:
     """Check the simulator against observations and write validation.md with its figures."""
 
-    parts: tuple[PartName, ...] = ("bands", "towers", "weather", "seasons", "disturbance")
+    parts: tuple[PartName, ...] = get_args(PartName)
     """parts to run; fewer than all give a document of those"""
     sites: int = 200
     """sampled sites that stands are held on"""
+    free_sites: int = 96
+    """sampled sites that stands run free on, up to 150 years"""
     tower_repeats: int = 3
     """times that a tower's years are run; the last, with soil and snow in balance, is compared"""
     quick: bool = False
-    """16 sites and a tower's years once: to see that everything runs, not to be believed"""
+    """16 sites (2 where stands run free) and a tower's years once: to see that everything runs, not to be believed"""
     output_dir: Path | None = None
     """folder for validation.md and images/; by default docs for the whole, otherwise results/validation"""
 
@@ -53,6 +64,7 @@ PARTS: dict[str, tuple[str, Callable[[Args], Part]]] = {
     ),
     "seasons": ("Seasonal courses of carbon and water", lambda args: seasonal_fluxes.report(args.sites)),
     "disturbance": ("Fire, insects and mortality", lambda args: disturbance_report.report(args.sites)),
+    "free": ("Stands that run free", lambda args: free_report.report(args.free_sites)),
 }
 
 INTRODUCTION = """# Validation
@@ -95,10 +107,12 @@ def write(folder: Path, text: str, figures: dict[str, bytes]) -> None:
 
 
 def main(args: Args) -> None:
-    if args.sites < 1 or args.tower_repeats < 1:
-        protocol.fail(f"--sites and --tower-repeats of at least 1 are allowed, not {args.sites}, {args.tower_repeats}")
+    for name, fewest in FEWEST.items():
+        if getattr(args, name) < fewest:
+            given = getattr(args, name)
+            protocol.fail(f"--{name.replace('_', '-')} of at least {fewest} is allowed, not {given}")
     if args.quick:
-        args.sites, args.tower_repeats = QUICK_SITES, 1
+        args = replace(args, **QUICK)
     whole = set(args.parts) == set(PARTS) and not args.quick
     folder = args.output_dir or (FULL_DOCUMENT if whole else OTHERWISE)
     try:

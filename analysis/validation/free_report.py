@@ -1,0 +1,313 @@
+"""The part of the validation on stands that run free: left alone, planted, and even-aged after fire."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from analysis.validation import document, stand_development
+from analysis.validation.disturbance_report import FIRE_RETURN, Fires
+from analysis.validation.document import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, Miss, Part, number, percent
+from analysis.validation.free_stands import (
+    EPISODE_YEARS,
+    EPISODES,
+    EVEN_AGED,
+    SEEDLINGS_HA,
+    STAND_YEARS,
+    STEM_EXPONENT,
+    STEM_KGC,
+    grow,
+)
+from analysis.validation.held_stands import Run
+from analysis.validation.observed_bands import CHECKS
+from analysis.validation.scores import IN, Band
+
+WINDOW = 5  # years that a flux is averaged over, up to the one shown
+SHOWN_YEARS = (1, 10, 25, 50)
+AGES = {"conifer": (20, 37, 71, 110, 150), "deciduous": (22, 30, 53, 75, 120)}
+LEFT_ALONE = ("left alone", "mature stand left alone")
+COURSES = dict(zip(EPISODES, (BLACK, PURPLE, GREY, BLUE, GREEN, ORANGE), strict=True))
+EVEN_AGED_COLOURS = {"conifer": BLUE, "deciduous": ORANGE}
+FLUX = "kgC m-2 yr-1"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is shown of a run, (years, sites): its unit, digits, and what likely is behind a value too low or high."""
+
+    unit: str
+    values: Callable[[Run], np.ndarray]
+    digits: int
+    low: str = ""
+    high: str = ""
+    flux: bool = False
+
+
+def net_primary_production(run: Run) -> np.ndarray:
+    return run.annual["gpp_kgc_m2"] - run.annual["autotrophic_respiration_kgc_m2"]
+
+
+def net_production(run: Run) -> np.ndarray:
+    """Net ecosystem production without fire, positive for uptake."""
+    return net_primary_production(run) - run.annual["heterotrophic_respiration_kgc_m2"]
+
+
+def deaths(run: Run) -> np.ndarray:
+    """Share of the biomass that dies in a year, fire aside [%]; 0 where nothing lives."""
+    dead = run.annual["mortality_kgc_m2"]
+    whole = run.annual["biomass_kgc_m2"] + dead
+    return 100.0 * np.divide(dead, whole, out=np.zeros_like(dead), where=whole > 0.0)
+
+
+THINNED = "background mortality and crowding take stems of all sizes alike"
+QUANTITIES = {
+    "biomass": Quantity(
+        "kgC m-2",
+        lambda run: run.annual["biomass_kgc_m2"],
+        1,
+        f"light use; {THINNED}",
+        "few trees die of crowding",
+    ),
+    "density": Quantity(
+        "stems ha-1",
+        lambda run: run.annual["density_stems_ha"],
+        0,
+        "the paper's largest density of 1500-2000 stems/ha; few recruits",
+        "recruits",
+    ),
+    "leaf area": Quantity(
+        "m2 m-2",
+        lambda run: run.annual["max_lai"],
+        1,
+        "cover falls with the number of stems; leaf area of closed crowns is the paper's 3-6",
+        "crowns close early",
+    ),
+    "basal area": Quantity("m2 ha-1", lambda run: run.annual["basal_area_m2_ha"], 0, "biomass", "biomass"),
+    "GPP": Quantity(
+        FLUX, lambda run: run.annual["gpp_kgc_m2"], 2, "leaf area; light use; no understorey", "light use", True
+    ),
+    "NPP": Quantity(FLUX, net_primary_production, 2, "leaf area; no understorey, no moss", "respiration", True),
+    "NEP": Quantity(FLUX, net_production, 2, "soil carbon drawn is beyond the litter's", "few dead trees", True),
+    "deaths": Quantity("% yr-1", deaths, 1, "no old trees", THINNED, True),
+}
+OBSERVED = tuple(name for name in QUANTITIES if name != "deaths")
+
+#: Biomass at the end over that at the start, by what it was over as many years in the Manitoba chronosequence: 71 to
+#: 151 years for a mature stand, 37 to 151 for one of any age.
+HELD = {"left alone": ((37, 71), (71, 151)), "mature stand left alone": ((71, 151),)}
+WOOD_DEATHS = Band(0.5, 1.5)
+MATURE_GPP = CHECKS["GPP"].bands["mature mixed"]
+DEATHS_SOURCE = "Alberta's reference stands, see above"
+
+
+def report(sites: int) -> Part:
+    """All courses on `sites` sites: tables, the figure, what misses."""
+    episodes = {kind: grow(course, sites) for kind, course in EPISODES.items()}
+    even_aged = {species: grow(course, sites) for species, course in EVEN_AGED.items()}
+    table = stand_development.observed()
+    ages, age_misses = _by_age(even_aged, table)
+    checks, check_misses = _checks(episodes, table)
+    unit = ", ".join(f"{name} [{quantity.unit}]" for name, quantity in QUANTITIES.items())
+    left_alone = "; ".join(
+        f"{kind}: {', '.join(number(_at(episodes[kind], 'biomass', year)[1], 1) for year in SHOWN_YEARS)} kgC/m2"
+        for kind in LEFT_ALONE
+    )
+    text = f"""{sites} sites drawn as for episodes of the environment; {EPISODE_YEARS} years (left alone and even-aged
+{STAND_YEARS}) of weather as generated, the same for every course. Nothing is put back. Stands begin as drawn or, where
+mature, with 1000 stems/ha of 41-100 years, half of each species, and 6 kgC/m2. They burn and have insects, and are
+planted with 100 stems/ha a year as far as there is room. Even-aged stands are {number(SEEDLINGS_HA, 0)} seedlings/ha on
+open ground; they do not burn, so that their age is the time since fire. Cells are the median over sites (10-90 %);
+fluxes are means of up to {WINDOW} years that end in the one named. Deaths are the share of the biomass that dies in a
+year, fire aside. NEP leaves fire and products out. Basal area is no output of the simulator: a species' carbon is
+shared among its stems by their relative carbon, and a stem of C kgC is (C/{STEM_KGC:g})^(1/{STEM_EXPONENT:g}) cm thick,
+so that 30 and 64 kgC are 15 and 20 cm (Lambert et al. 2005); it is as good as that.
+
+Of retained trees in Alberta 2.9 % (spruce), 6.1 % (aspen) and 8.7 % (birch) died a year, 2.5 to 4 times as many as in
+reference stands (Bladon et al. 2008): 0.7-1.2, 1.5-2.4 and 2.2-3.5 % of stems there. The stems that die are small, so
+that the share of the wood is smaller; {number(WOOD_DEATHS.low, 1)}-{number(WOOD_DEATHS.high, 1)} % is asked for here.
+Intervals of the fire return are 95 % (Poisson).
+
+Median biomass in years {", ".join(str(year) for year in SHOWN_YEARS)}. {left_alone}.
+
+{document.table(["course", "year", *QUANTITIES], _by_year(episodes), left=2)}
+
+Units: {unit}.
+
+{document.table(["check", "course", "value", "observed", "verdict", "source"], checks, left=6)}
+
+Even-aged stands by age against stands of that age (within {percent(stand_development.NEAR)}), all of them in
+[stand_development.csv](../analysis/observations/stand_development.csv) with their sources, and towers of known age in
+ABCflux. The band is the range of the observations, {percent(stand_development.SLACK)} wider at both ends (NEP:
+{stand_development.SLACK_NEP:g} kgC/m2/yr). The observed stands are in warmer climates, 2 to −3 degC against −10 to −5
+here; their NPP, GPP and NEP include an understorey and moss, which the simulator lacks.
+
+{document.table(["species", "quantity", "age", "model", "observed", "verdict", "from"], ages, left=7)}
+
+![Free-running stands](images/validation_free_stands.png)"""
+    figure = {"validation_free_stands.png": draw(episodes, even_aged, table)}
+    return Part(text, figure, [*check_misses, *age_misses])
+
+
+def course_of(run: Run, name: str) -> np.ndarray:
+    """A quantity by year, (years, sites): stocks of the year, fluxes averaged over the window that ends with it."""
+    values = QUANTITIES[name].values(run)
+    if not QUANTITIES[name].flux:
+        return values
+    sums = np.cumsum(np.vstack([np.zeros_like(values[:1]), values]), axis=0)
+    ends = np.arange(1, len(values) + 1)
+    starts = np.maximum(ends - WINDOW, 0)
+    return (sums[ends] - sums[starts]) / (ends - starts)[:, None]
+
+
+def _at(run: Run, name: str, year: int) -> np.ndarray:
+    """10, 50 and 90 % of the sites in a year, counted from 1."""
+    return np.percentile(course_of(run, name)[year - 1], [10, 50, 90])
+
+
+def _spread(values: np.ndarray, digits: int) -> str:
+    low, median, high = (number(value, digits) for value in values)
+    return f"{median} ({low} .. {high})"
+
+
+def _by_year(episodes: dict[str, Run]) -> list[list[str]]:
+    rows = []
+    for kind, run in episodes.items():
+        for year in (*SHOWN_YEARS, *((STAND_YEARS,) if EPISODES[kind].years == STAND_YEARS else ())):
+            cells = [_spread(_at(run, name, year), quantity.digits) for name, quantity in QUANTITIES.items()]
+            rows.append([kind if year == 1 else "", str(year), *cells])
+    return rows
+
+
+def _by_age(even_aged: dict[str, Run], table: pd.DataFrame) -> tuple[list[list[str]], list[Miss]]:
+    rows, misses = [], []
+    for species, run in even_aged.items():
+        for name in OBSERVED:
+            for age in AGES[species]:
+                band = stand_development.band(table, species, name, age)
+                if band is None:
+                    continue
+                values = _at(run, name, age)
+                quantity = QUANTITIES[name]
+                digits = band.digits(float(values[1]), quantity.digits)
+                verdict = _verdict(band, values[1])
+                limits = _limits(band, digits)
+                stands = stand_development.about(table, species, name, age)
+                sources = ", ".join(dict.fromkeys(stands.source))
+                label = f"{name} [{quantity.unit}]"
+                rows.append([species, label, str(age), _spread(values, digits), limits, verdict, sources])
+                if verdict != IN:
+                    likely = quantity.low if "low" in verdict else quantity.high
+                    what = f"{name} at {age} years: median {number(values[1], digits)}, observed {limits}"
+                    misses.append(Miss(f"even-aged {species}", what, likely))
+    return rows, misses
+
+
+def _checks(episodes: dict[str, Run], table: pd.DataFrame) -> tuple[list[list[str]], list[Miss]]:
+    """What a stand that is left alone or planted keeps, loses and how often it burns."""
+    rows, misses = [], []
+
+    def check(name, kind, value, band, digits, source, low, high, spread=""):
+        digits, verdict = band.digits(value, digits), _verdict(band, value)
+        limits = _limits(band, digits)
+        rows.append([name, kind, number(value, digits) + spread, limits, verdict, source])
+        if verdict != IN:
+            likely = low if "low" in verdict else high
+            misses.append(Miss(kind, f"{name}: {number(value, digits)}, observed {limits}", likely))
+
+    for kind, spans in HELD.items():
+        biomass = episodes[kind].annual["biomass_kgc_m2"][[0, EPISODE_YEARS - 1]]
+        first, last = np.median(biomass, axis=1)
+        name = f"biomass in year {EPISODE_YEARS} over year 1"
+        why = f"the first stand is out of balance with its growth; {THINNED}"
+        check(name, kind, last / first, growth(table, spans), 2, _growth_source(spans), why, "growth")
+    for kind, run in episodes.items():
+        value = float(np.median(deaths(run)[EPISODE_YEARS - 10 : EPISODE_YEARS]))
+        name = f"deaths [% yr-1], years {EPISODE_YEARS - 9}-{EPISODE_YEARS}"
+        check(name, kind, value, WOOD_DEATHS, 1, DEATHS_SOURCE, "no old trees", THINNED)
+    for kind, run in episodes.items():
+        value = float(np.median(course_of(run, "GPP")[EPISODE_YEARS - 1]))
+        name = f"GPP [{FLUX}], years {EPISODE_YEARS - WINDOW + 1}-{EPISODE_YEARS}"
+        check(name, kind, value, MATURE_GPP, 2, "mature stands, part 1", "leaf area and light use", "light use")
+    for kind, run in episodes.items():
+        fires = Fires.of(run)
+        if fires.number:
+            why = "the hazard grows with cover, and free stands are open"
+            source = "Yukon Flats 90 ± 32 (Drury and Grissom 2008); part 5"
+            spread = f" ({number(fires.low, 0)} .. {number(fires.high, 0)})"
+            check("fire return [yr]", kind, fires.interval, FIRE_RETURN, 0, source, "cover", why, spread)
+    return rows, misses
+
+
+def growth(table: pd.DataFrame, spans: tuple[tuple[int, int], ...]) -> Band:
+    """Range of the biomass at the second age of a span over that at the first, wet and dry Manitoba stands."""
+    ratios = []
+    for drainage in ("dry", "wet"):
+        chosen = table.stand.str.startswith(f"Manitoba black spruce, {drainage}") & (table.quantity == "biomass")
+        by_age = table[chosen].set_index("age_low")[["low", "high"]].mean(axis=1)
+        ratios += [by_age[end] / by_age[start] for start, end in spans]
+    return Band(float(min(ratios)), float(max(ratios)))
+
+
+def _growth_source(spans: tuple[tuple[int, int], ...]) -> str:
+    ages = " and ".join(f"{start} to {end}" for start, end in spans)
+    return f"Manitoba black spruce, wet and dry, from {ages} years (Wang et al. 2003)"
+
+
+def _verdict(band: Band, value: float) -> str:
+    verdict = band.verdict(float(value))
+    return verdict if verdict == IN else f"**{verdict}**"
+
+
+def _limits(band: Band, digits: int) -> str:
+    return f"{number(band.low, digits)} .. {number(band.high, digits)}"
+
+
+@document.styled
+def draw(episodes: dict[str, Run], even_aged: dict[str, Run], table: pd.DataFrame) -> bytes:
+    """PNG: even-aged stands by age with what was observed (two rows), and the courses of an episode (third row)."""
+    figure = document.new_figure(12.0, 7.8)
+    axes = figure.subplots(3, 5)
+    for row, (species, run) in enumerate(even_aged.items()):
+        for ax, name in zip(axes[row], ("biomass", "leaf area", "basal area", "NPP", "NEP"), strict=True):
+            _draw_ages(ax, name, run, EVEN_AGED_COLOURS[species], table[table.species == species])
+            ax.set_title(f"even-aged {species}: {name}")
+    for ax, name in zip(axes[2], ("biomass", "density", "leaf area", "GPP", "deaths"), strict=True):
+        for kind, run in episodes.items():
+            medians = np.median(course_of(run, name)[:EPISODE_YEARS], axis=1)
+            dashed = kind in LEFT_ALONE
+            years = np.arange(1, len(medians) + 1)
+            ax.plot(years, medians, color=COURSES[kind], ls="--" if dashed else "-", label=kind)
+        if name == "deaths":
+            ax.axhspan(WOOD_DEATHS.low, WOOD_DEATHS.high, color=GREY, alpha=0.3, lw=0)
+        ax.set_title(f"episodes: {name}")
+        ax.set_xlabel("year")
+        ax.set_ylabel(QUANTITIES[name].unit)
+        ax.set_ylim(0.0)
+    handles, labels = axes[2, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    title = (
+        "Free-running stands: median and 10-90 % of sites; observed stands by age: plots (black), towers (light blue)"
+    )
+    figure.suptitle(title)
+    return document.png(figure)
+
+
+def _draw_ages(ax, name: str, run: Run, colour: str, table: pd.DataFrame) -> None:
+    values = course_of(run, name)
+    years = np.arange(1, len(values) + 1)
+    low, median, high = np.percentile(values, [10, 50, 90], axis=1)
+    ax.fill_between(years, low, high, color=colour, alpha=0.25, lw=0)
+    ax.plot(years, median, color=colour)
+    for stand in table[table.quantity == name].itertuples():
+        shade = SKY if stand.source == "ABCflux" else BLACK
+        age, value = 0.5 * (stand.age_low + stand.age_high), 0.5 * (stand.low + stand.high)
+        spans = [[0.5 * (stand.age_high - stand.age_low)], [0.5 * (stand.high - stand.low)]]
+        ax.errorbar(age, value, xerr=spans[0], yerr=spans[1], fmt="o", ms=3.5, lw=1, color=shade)
+    if name == "NEP":
+        ax.axhline(0.0, color=GREY, lw=0.8)
+    else:
+        ax.set_ylim(0.0)
+    ax.set_xlim(0.0, STAND_YEARS + 5)
+    ax.set_xlabel("age [yr]")
+    ax.set_ylabel(QUANTITIES[name].unit)
