@@ -213,3 +213,14 @@ def test_every_miss_is_listed_and_parts_keep_their_order():
     miss = document.Miss("here", "too low", "a process")
     text = validate.assemble({"seasons": document.Part("later", misses=[miss]), "bands": document.Part("first")})
     assert text.index("first") < text.index("later") < text.index("| here | too low | a process |")
+
+
+def test_stands_run_free_and_experiments_in_a_quick_run(tmp_path, capsys):
+    run_script("analysis/validate.py", "--quick", "--parts", "free", "field", "robustness", "--output-dir", tmp_path)
+    text = (tmp_path / "validation.md").read_text()
+    for heading in ("## 6. Stands that run free", "## 7. Field experiments", "## 8. What the thaw return hangs on"):
+        assert heading in text
+    assert (tmp_path / "images" / "validation_free_stands.png").exists()
+    assert "`python analysis/studies/planting_signs.py` finds them" in " ".join(text.split())
+    assert " nan" not in text
+    capsys.readouterr()

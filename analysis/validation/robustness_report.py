@@ -1,0 +1,204 @@
+"""The part of the validation on what the thaw return hangs on: the boundary, the snow's density, every constant."""
+
+import numpy as np
+import pandas as pd
+
+import sim
+from analysis.studies import open_loop, planting_signs, stored, variance
+from analysis.validation import document
+from analysis.validation.balanced_boundary import BOUNDARY, balanced
+from analysis.validation.document import Miss, Part, number, percent
+from analysis.validation.scores import IN, Band
+
+YEARS, QUICK_YEARS = 50, 10
+PLANS = {"zero change": 12, "+100 conifers": 24, "+100 deciduous": 20, "−100": 2}
+SNOW_PLANS = {name: PLANS[name] for name in ("zero change", "+100 conifers", "+100 deciduous")}
+SNOW_SITES = 16  # with three plans they fill three blocks of sixteen lanes
+
+#: Densities of the snow [kg m-3], under a closed canopy and in the open: those in use, 10 % off, other published ones.
+SHELTERED, OPEN = (sim.CONSTANTS[f"snow_density_{where}"].low for where in ("sheltered", "open"))
+SNOWS = {
+    "in use": (SHELTERED, OPEN),
+    "sheltered −10 %": (0.9 * SHELTERED, OPEN),
+    "sheltered +10 %": (1.1 * SHELTERED, OPEN),
+    "open −10 %": (SHELTERED, 0.9 * OPEN),
+    "open +10 %": (SHELTERED, 1.1 * OPEN),
+    "alike": (SHELTERED, SHELTERED),
+    "fresh and light": (170.0, 180.0),
+    "windy": (SHELTERED, 250.0),
+}
+JUDGED = tuple(name for name in SNOWS if "10 %" in name)
+ZERO_CHANGE = Band(-3.0, 3.0)  # how far a constant moved by 10 % may move the return of zero change
+
+BALANCE = Band(-5.0, 5.0)  # mean heat into a boundary that is in balance [MJ m-2 yr-1]
+BALANCE_YEARS = 10
+DENSITY = "snow density is a constant of the cover: it does not age, settle or drift"
+
+
+def report(sites: int, quick: bool = False) -> Part:
+    """Variance of the thaw return on `sites` sites; snow on some of them; the signs that were stored.
+
+    quick : fewer years, and no look at what is stored.
+    """
+    years = QUICK_YEARS if quick else YEARS
+    numbers = [open_loop.FIRST_SITE_SEED + k for k in range(sites)]
+    seeds = [open_loop.seeds(seed, k) for k, seed in enumerate(numbers)]
+    sampled = [sim.sample_site(seed) for seed in numbers]
+    in_balance, heat = balanced(sampled, seeds)
+    boundaries = {"as sampled": sampled, "in balance": in_balance}
+    rows, within = zip(*(_variance(name, chosen, seeds, years) for name, chosen in boundaries.items()), strict=True)
+    shift = np.abs([site[BOUNDARY] - first[BOUNDARY] for site, first in zip(in_balance, sampled, strict=True)])
+    snow_rows, misses = _snow(sampled[:SNOW_SITES], seeds[:SNOW_SITES], years)
+    signs, sign_misses = _signs(quick)
+    low, middle, high = (number(value, 1) for value in np.percentile(heat, [5, 50, 95]))
+    header = ["boundary", "zero change", "s.d. over sites", "site", "policy", "site x policy", "years clipped"]
+    text = f"""The thaw return over {years} years, as rewarded, on {sites} sampled sites with their own first stands; a
+weather for each site, the same for every plan. Shares of its variance are components of a crossed design of sites and
+four plans ({", ".join(PLANS)} stems/ha a year), of which the interaction is what is left. In balance, the boundary of
+each site is at the temperature at which its own first stand, held, gives it no heat: it moved by
+{number(float(np.median(shift)), 1)} K (median), and what still flows below held stands is {middle} MJ/m2/yr ({low} ..
+{high}, 5-95 % of sites). In the first {BALANCE_YEARS} years of zero change, when stands are free, it is within
+{number(BALANCE.high, 0)} MJ/m2/yr of zero at {percent(within[0])} of the sites with the boundary as sampled and at
+{percent(within[1])} in balance.
+
+{document.table([*header, *list(PLANS)[1:]], list(rows), left=1)}
+
+Plans are means less zero change ± standard errors over sites.
+
+The density of snow is constant under a canopy and in the open. The same return on {min(sites, SNOW_SITES)} of the sites
+with other densities; a density moved by 10 % misses where it moves zero change by more than
+{number(ZERO_CHANGE.high, 0)} or turns the sign of a species' effect.
+
+{document.table(["densities", "kg m-3", "zero change", *list(SNOW_PLANS)[1:], "verdict"], snow_rows, left=2)}
+
+{signs}"""
+    return Part(text, misses=[*misses, *sign_misses])
+
+
+def _play(
+    sites: list[dict], seeds: list, plans: dict[str, int], years: int, constants: dict | None = None
+) -> open_loop.Episodes:
+    """Every plan on every site, the plans of a site one after the other."""
+    design = [(site, seed, plan) for site, seed in zip(sites, seeds, strict=True) for plan in plans.values()]
+    chosen, dice, actions = zip(*design, strict=True)
+    actions = np.repeat([[plan] for plan in actions], years, axis=1)
+    return open_loop.play(list(chosen), list(dice), actions, constants=constants)
+
+
+def _thaw_returns(episodes: open_loop.Episodes, plans: dict[str, int]) -> np.ndarray:
+    """(sites, plans)."""
+    return episodes.returns()[:, 1].reshape(-1, len(plans))
+
+
+def _variance(name: str, sites: list[dict], seeds: list, years: int) -> tuple[list[str], float]:
+    """A row: spread, shares and the plans' effects; and the share of sites whose boundary takes nearly no heat in the
+    first years of zero change."""
+    episodes = _play(sites, seeds, PLANS, years)
+    returns = _thaw_returns(episodes, PLANS)
+    shares = variance.shares(variance.variance_components(returns, ("site", "policy")))
+    heat = boundary_heat(episodes.record[:: len(PLANS), :BALANCE_YEARS])
+    row = [
+        name,
+        number(float(returns[:, 0].mean()), 1),
+        number(float(returns[:, 0].std(ddof=1)), 1),
+        *(f"{number(100.0 * shares[term], 1)} %" for term in ("site", "policy", "site x policy")),
+        number(float(episodes.clipped_years()[:, 1].mean()), 1),
+        *_effects(returns),
+    ]
+    return row, BALANCE.share_within(heat)
+
+
+def boundary_heat(record: np.ndarray) -> np.ndarray:
+    """Mean heat into the boundary [MJ m-2 yr-1], (sites,); record (sites, years, its columns)."""
+    column = sim.RECORD_NAMES.index
+    return (record[:, :, column("boundary_warming_mj_m2")] - record[:, :, column("boundary_cooling_mj_m2")]).mean(
+        axis=1
+    )
+
+
+def _effects(returns: np.ndarray) -> list[str]:
+    """What each plan adds to zero change, the first column: mean and standard error over sites."""
+    gains = returns[:, 1:] - returns[:, :1]
+    errors = gains.std(axis=0, ddof=1) / np.sqrt(len(gains))
+    means = gains.mean(axis=0)
+    return [f"{number(mean, 2, sign=True)} ± {number(error, 2)}" for mean, error in zip(means, errors, strict=True)]
+
+
+def _snow(sites: list[dict], seeds: list, years: int) -> tuple[list[list[str]], list[Miss]]:
+    rows, misses, means = [], [], {}
+    for name, (sheltered, in_the_open) in SNOWS.items():
+        constants = {"snow_density_sheltered": sheltered, "snow_density_open": in_the_open}
+        returns = _thaw_returns(_play(sites, seeds, SNOW_PLANS, years, constants), SNOW_PLANS)
+        gains = (returns[:, 1:] - returns[:, :1]).mean(axis=0)
+        means[name] = (float(returns[:, 0].mean()), *gains)
+        found = problems(means["in use"], means[name]) if name in JUDGED else []
+        verdict = "" if name not in JUDGED else f"**MISS**: {', '.join(found)}" if found else IN
+        densities = f"{number(sheltered, 0)}, {number(in_the_open, 0)}"
+        rows.append([name, densities, number(means[name][0], 1), *_effects(returns), verdict])
+        misses += [Miss("sampled sites", f"snow density {name}: {', '.join(found)}", DENSITY)] if found else []
+    return rows, misses
+
+
+def problems(before: tuple[float, float, float], after: tuple[float, float, float]) -> list[str]:
+    """What a change did that it should not; returns of zero change and gains of conifers and deciduous trees."""
+    moved = after[0] - before[0]
+    found = [] if ZERO_CHANGE.verdict(moved) == IN else [f"zero change moves by {number(moved, 1, sign=True)}"]
+    for species, old, new in zip(("conifers", "deciduous"), before[1:], after[1:], strict=True):
+        if old * new < 0.0:
+            found.append(f"{species} turn from {number(old, 2, sign=True)} to {number(new, 2, sign=True)}")
+    return found
+
+
+def _signs(quick: bool) -> tuple[str, list[Miss]]:
+    """What `planting_signs.py` found, if it ran on this simulator."""
+    args, path = planting_signs.Args(), planting_signs.path()
+    if quick or not stored.is_finished(path, planting_signs.settings(args)):
+        command = "python analysis/studies/planting_signs.py"
+        return f"Signs with every constant 10 % off are not there for this simulator; `{command}` finds them.", []
+    return signs_found(stored.read(path, text=("value",)), args.sites)
+
+
+def signs_found(table: pd.DataFrame, sites: int) -> tuple[str, list[Miss]]:
+    """Text and misses: constants that turn the sign of planting's effect, or move zero change too far.
+
+    table : of `planting_signs.py`, a row a constant and level, the first of them the default.
+    """
+    columns = ["zero_change", "conifers", "deciduous"]
+    default = table[table.constant == "default"].iloc[0]
+    before = tuple(default[columns])
+    levels = table[table.constant != "default"]
+    rows, misses = [], []
+    for level in levels.itertuples():
+        after = (level.zero_change, level.conifers, level.deciduous)
+        found = problems(before, after)
+        if not found:
+            continue
+        values = [number(value, 2, sign=True) for value in after]
+        rows.append([f"`{level.constant}`", level.value, *values, ", ".join(found)])
+        misses.append(
+            Miss(
+                "sites that span the sampled",
+                f"`{level.constant}` = {level.value}: {', '.join(found)}",
+                _process(level),
+            )
+        )
+    effects = [
+        f"{number(default[name], 2, sign=True)} ± {number(default[f'{name}_se'], 2)} ({name})"
+        for name in ("conifers", "deciduous")
+    ]
+    turned = {name: levels[levels[name] * default[name] < 0.0].constant.nunique() for name in ("conifers", "deciduous")}
+    header = ["constant", "value", "zero change", "conifers", "deciduous", "what turns or moves"]
+    listed = document.table(header, rows, left=6) if rows else "No constant does either."
+    text = f"""Every constant 10 % below and above its value ({levels.constant.nunique()} constants, {len(levels)}
+levels; steps as in [sensitivity.md](sensitivity.md)), one at a time, on {sites} sites that span what is sampled,
+without fire and insects. At the values in use zero change returns {number(default.zero_change, 2, sign=True)}, and
+planting adds {" and ".join(effects)}. Constants that turn the sign of the effect: {turned["conifers"]} of
+conifers, {turned["deciduous"]} of deciduous trees. Listed are these, and those that move zero change by more than
+{number(ZERO_CHANGE.high, 0)}.
+
+{listed}"""
+    return text, misses
+
+
+def _process(level) -> str:
+    return DENSITY if level.constant.startswith("snow_density") else f"{level.group.removeprefix('constants ')}"
