@@ -144,19 +144,8 @@ def newton_iteration(b):
 
 
 @compiled
-def start_canopy(b):
-    """Trial temperatures of the canopies, and brackets about their solutions."""
-    s, w = b.s, b.w
-    for i in range(len(s.swe)):
-        w.trial[i] = s.canopy[i]
-        w.low[i] = w.air[i] - 100.0
-        w.high[i] = w.air[i] + 300.0  # a few trees in calm air, and a low sun that shines on nothing else
-
-
-@compiled
 def solve_canopy(b):
     """Newton's method for all lanes together; a lane that has converged stays where it is."""
-    start_canopy(b)
     iterations = 0
     while newton_iteration(b) > 0 and iterations < NEWTON_LIMIT:
         iterations += 1

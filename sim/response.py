@@ -10,7 +10,7 @@ from sim.physical_constants import (
 )
 from sim.radiation import black_body, black_body_slope
 from sim.snow import ground_capacity
-from sim.soil import boundary_temperature, heat_capacity
+from sim.soil import boundary_temperature, heat_capacity, soil_conductances
 
 
 @compiled
@@ -99,10 +99,11 @@ def respond_to_canopy(
 
 @compiled
 def answer_to_canopy(b, seconds):
-    """The nodes' answer to the canopy, from their temperatures and conductances at the start of the step."""
+    """The nodes' answer to the canopy, from the soil's conductances at the start of the step; where Newton starts."""
     s, p, w = b.s, b.p, b.w
     per_second = 1.0 / seconds
     for i in range(len(s.swe)):
+        soil_conductances(b, i)
         exchange = w.air_density[i] * AIR_HEAT_CAPACITY * w.ground_exchange[i]
         w.ground_conductance[i] = max(exchange, p.minimum_conductance[i])
         ice = min(s.ground[i], 0.0)
@@ -157,4 +158,7 @@ def answer_to_canopy(b, seconds):
         sublimating = (w.ground_latent[i] - w.latent_slope[i] * ice) * (seconds / LATENT_HEAT_SUBLIMATION)
         meltable = s.swe[i] - sublimating if s.swe[i] > 0.0 else 0.0
         w.melt_span[i] = LATENT_HEAT_FUSION * max(meltable, 0.0) * (per_second * yielding)
+        w.trial[i] = s.canopy[i]
+        w.low[i] = w.air[i] - 100.0
+        w.high[i] = w.air[i] + 300.0  # a few trees in calm air, and a low sun that shines on nothing else
         w.bare_gain[i] = stiffness / (stiffness - ICE_HEAT_CAPACITY * s.swe[i] * per_second - w.latent_slope[i])

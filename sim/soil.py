@@ -153,31 +153,28 @@ def boundary_temperature(b, i) -> float:
 
 
 @compiled
-def soil_conductances(b):
-    """Temperatures of the two nodes at the start of the step, and the conductances between ground, nodes, boundary."""
+def soil_conductances(b, i):
+    """A lane's two nodes at the start of the step, and the conductances between ground, nodes and boundary."""
     s, p, w = b.s, b.p, b.w
-    for i in range(len(s.swe)):
-        span = p.soil_freezing_range_k[i]
-        w.surface[i] = temperature(
-            s.surface_heat[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], span
-        )
-        w.deep[i] = temperature(s.deep_heat[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], span)
-        thawed, frozen = p.soil_conductivity[i], p.soil_conductivity[i] * w.frozen_ratio[i]
-        # A node thicker than the front's daily reach freezes and thaws from above: its upper half is as the ground is.
-        upper = conductivity(frozen_share(s.ground[i], span), thawed, frozen)
-        lower = conductivity(frozen_share(w.surface[i], span), thawed, frozen)
-        deep = conductivity(frozen_share(w.deep[i], span), thawed, frozen)
-        below = conductivity(frozen_share(0.5 * (w.deep[i] + boundary_temperature(b, i)), span), thawed, frozen)
-        organic = conductivity(
-            frozen_share(0.5 * (s.ground[i] + w.surface[i]), span),
-            p.organic_conductivity_thawed[i],
-            p.organic_conductivity_frozen[i],
-        )
-        w.upper_soil[i] = w.half_surface[i] / upper
-        above_and_below = s.swe[i] * w.snow_resistance[i] + w.upper_soil[i]  # of the organic layer
-        w.surface_conductance[i] = in_series(above_and_below, 1.0, s.organic_depth[i] * p.moss[i], organic)
-        w.deep_conductance[i] = in_series(w.half_surface[i], lower, w.above_deep_node[i], deep)
-        w.boundary_conductance[i] = below * w.per_below_deep_node[i]
+    span = p.soil_freezing_range_k[i]
+    w.surface[i] = temperature(s.surface_heat[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], span)
+    w.deep[i] = temperature(s.deep_heat[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], span)
+    thawed, frozen = p.soil_conductivity[i], p.soil_conductivity[i] * w.frozen_ratio[i]
+    # A node thicker than the front's daily reach freezes and thaws from above: its upper half is as the ground is.
+    upper = conductivity(frozen_share(s.ground[i], span), thawed, frozen)
+    lower = conductivity(frozen_share(w.surface[i], span), thawed, frozen)
+    deep = conductivity(frozen_share(w.deep[i], span), thawed, frozen)
+    below = conductivity(frozen_share(0.5 * (w.deep[i] + boundary_temperature(b, i)), span), thawed, frozen)
+    organic = conductivity(
+        frozen_share(0.5 * (s.ground[i] + w.surface[i]), span),
+        p.organic_conductivity_thawed[i],
+        p.organic_conductivity_frozen[i],
+    )
+    w.upper_soil[i] = w.half_surface[i] / upper
+    above_and_below = s.swe[i] * w.snow_resistance[i] + w.upper_soil[i]  # of the organic layer
+    w.surface_conductance[i] = in_series(above_and_below, 1.0, s.organic_depth[i] * p.moss[i], organic)
+    w.deep_conductance[i] = in_series(w.half_surface[i], lower, w.above_deep_node[i], deep)
+    w.boundary_conductance[i] = below * w.per_below_deep_node[i]
 
 
 @compiled

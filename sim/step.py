@@ -14,7 +14,6 @@ from sim.interception import rainfall
 from sim.jit import compiled
 from sim.response import answer_to_canopy
 from sim.snowfall import any_snow, no_snow, snowfall
-from sim.soil import soil_conductances
 from sim.sunlight import any_sun, darkness, sunlight
 from sim.water import drought_stress
 from sim.wind import ground_exchange
@@ -38,7 +37,6 @@ def simulate_step(b, seconds):
     if snow:
         snow_vapour(b, seconds)
     evaporation(b, seconds)
-    soil_conductances(b)
     answer_to_canopy(b, seconds)
     solve_canopy(b)
     move_heat_and_water(b, seconds)

@@ -406,7 +406,8 @@ def test_the_document(tmp_path, capsys):
     assert f"{len(numbers)} claims of the paper" in capsys.readouterr().out
     lacking = "No runs yet: `python analysis/reproduce.py --only main controls` (python cleanrl_style/ppo_curriculum.py"
     assert f"{lacking} --seed 1 --vectorization lockstep --selector coin is lacking)" in text
-    assert "| `main` | 2 | 35 | `constant_plans`" in text
+    jobs = [job for job in experiments.jobs(("main",)) if not job.is_study]
+    assert f"| `main` | 2 | {len(jobs)} | `constant_plans`" in text
 
 
 def test_the_committed_document_shows_the_committed_runs(tmp_path, monkeypatch):

@@ -15,11 +15,11 @@ from cleanrl_style import protocol
 from cleanrl_style.ppo_gated import Args
 
 COUNTS = {
-    "main": 7 + 10 * len(methods.LEARNERS),
+    "main": 2 + len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
     "fixed": 25,
     "site": 45,
     "thaw": 12,
-    "balanced": 5 + 5 * len(methods.LEARNERS),
+    "balanced": len(methods.STRATEGIES) + 5 * len(methods.LEARNERS),
     "controls": 20,
     "variants": 40,
     "mechanisms": 2,

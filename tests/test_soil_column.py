@@ -103,7 +103,7 @@ def test_two_nodes_have_the_simulators_conductances(surface, swe):
         daily, (entering, warming, cooling) = column.run(steady)
     b.s.surface_heat[0], b.s.deep_heat[0] = column.heat
     b.s.ground[0], b.s.swe[0] = surface, swe
-    uncompiled(soil_conductances)(b)
+    uncompiled(soil_conductances)(b, 0)
     upper, lower = daily[-1]
     assert (b.w.surface[0], b.w.deep[0]) == approx((upper, lower), abs=1e-4)
     assert entering == approx(warming - cooling, rel=1e-4)

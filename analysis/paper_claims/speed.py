@@ -117,15 +117,16 @@ def workers(evidence):
     "The canopy's solver takes 60 to 70 % of the physics.",
     "Appendix, runtime",
     PROFILE,
-    why="The canopy is solved by Newton's method in few iterations; conductances, transfers and snow cost as much.",
+    why="The canopy is solved by Newton's method in few iterations; the soil's answer, fluxes and snow cost as much.",
 )
 def solver_share(evidence):
     table = evidence.beside("profile_kernel.csv", pd.read_csv).set_index("phase")
-    share = {name: 100 * table.loc[name].sum() / table.loc["sum"].sum() for name in ("solve_canopy", "conductances")}
+    phases = ("solve_canopy", "answer_to_canopy")
+    share = {name: 100 * table.loc[name].sum() / table.loc["sum"].sum() for name in phases}
     ours = Number(share["solve_canopy"])
     rows = [
         Row("share of the solver [%], mean of four moments of the year", published("canopy_solver_share"), ours),
-        Row("with the conductances it starts from [%]", "", Number(sum(share.values()))),
+        Row("with the other nodes' answer, from which it starts [%]", "", Number(sum(share.values()))),
     ]
     return finding(rows, about(ours, 60, 70))
 
