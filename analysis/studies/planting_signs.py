@@ -17,8 +17,8 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis import paths
-from analysis.studies import open_loop, sensitivity, stored
+from analysis import paths, stored
+from analysis.studies import open_loop, sensitivity
 from analysis.studies.sensitivity import DEFAULT, Variant
 from cleanrl_style import protocol
 from sim.stands import available_cores

@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis.studies import open_loop, planting_signs, stored, variance
+from analysis import stored
+from analysis.studies import open_loop, planting_signs, variance
 from analysis.validation import document
 from analysis.validation.balanced_boundary import BOUNDARY, balanced
 from analysis.validation.document import Miss, Part, number, percent
