@@ -2,11 +2,11 @@
 
 import math
 
+from sim.active_layer import active_layer
 from sim.demography import class_ages, count_classes, count_stand
 from sim.jit import compiled, phase
 from sim.physical_constants import DAYS_PER_YEAR, LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
-from sim.snow import SNOW_DAY_MM
-from sim.soil import active_layer
+from sim.snow import SNOW_DAY_MM, snow_depth
 from sim.weather import december_to_march, season
 
 GROWING_SEASON_C = 5.0
@@ -31,6 +31,7 @@ def clear_year(b, i):
     w.winter_days[i] = 0.0
     w.thaw_warmth[i] = 0.0
     w.thaw_seconds[i] = 0.0
+    w.thaw_water[i] = 0.0
 
 
 @phase
@@ -45,6 +46,7 @@ def clear_day(b, day, daily):
         w.canopy_sum[i] = 0.0
         w.ground_sum[i] = 0.0
         w.top_sum[i] = 0.0
+        w.organic_sum[i] = 0.0
         w.surface_sum[i] = 0.0
         w.deep_sum[i] = 0.0
     if len(daily) > 0:
@@ -77,14 +79,15 @@ def total_sensible(heat) -> float:
 @compiled
 def total_vapour(b, i, vapour) -> float:
     """All vapour of a step [mm], of a `sim.fluxes.Vapour` and of the canopy's snow."""
-    return vapour.leaves + vapour.wet_canopy + vapour.snow + vapour.soil + b.w.canopy_sublimation[i]
+    return vapour.leaves + vapour.wet_canopy + vapour.snow + vapour.moss + b.w.canopy_sublimation[i]
 
 
 @compiled
-def add_step(b, i, net_radiation, heat, vapour, excess, carried, seconds):
+def add_step(b, i, net_radiation, heat, vapour, excess, advected, seconds):
     """Add the step's fluxes and temperatures of a lane to the account.
 
-    heat, vapour : `sim.fluxes.Heat` and `Vapour`; excess : runoff [mm]; carried : heat of snow that sublimated [J m-2].
+    heat, vapour : `sim.fluxes.Heat` and `Vapour`; excess : runoff [mm]; advected : heat that water and snow
+    brought, less what they took along [J m-2].
     """
     s, w, r = b.s, b.w, b.r
     all_vapour = total_vapour(b, i, vapour)
@@ -93,6 +96,7 @@ def add_step(b, i, net_radiation, heat, vapour, excess, carried, seconds):
     r.snowfall_mm[i] += w.snow[i]
     r.evapotranspiration_mm[i] += all_vapour
     r.transpiration_mm[i] += vapour.leaves
+    r.floor_evaporation_mm[i] += vapour.moss
     r.sublimation_mm[i] += sublimated
     r.canopy_sublimation_mm[i] += w.canopy_sublimation[i]
     r.runoff_mm[i] += excess
@@ -103,18 +107,21 @@ def add_step(b, i, net_radiation, heat, vapour, excess, carried, seconds):
     r.ground_shortwave_mj_m2[i] += 1e-6 * seconds * w.ground_sw[i]
     r.boundary_warming_mj_m2[i] += 1e-6 * seconds * max(heat.deep_to_boundary, 0.0)
     r.boundary_cooling_mj_m2[i] += 1e-6 * seconds * max(-heat.deep_to_boundary, 0.0)
-    r.snow_heat_mj_m2[i] += 1e-6 * (w.advected[i] - carried)
+    r.advected_heat_mj_m2[i] += 1e-6 * advected
     r.deep_heat_gain_mj_m2[i] += 1e-6 * seconds * (heat.surface_to_deep - heat.deep_to_boundary)
     w.reflected_sum[i] += w.reflected[i]
     w.shortwave_sum[i] += w.shortwave[i]
-    w.soil_heat_sum[i] += 1e-6 * seconds * heat.ground_to_surface
+    w.soil_heat_sum[i] += 1e-6 * seconds * heat.ground_to_organic
     w.thaw_warmth[i] += seconds * max(s.ground[i], 0.0)
     # A melting snowpack is at 0 degC but for round-off.
-    w.thaw_seconds[i] += seconds if s.ground[i] > 1e-6 else 0.0
+    thawing = seconds if s.ground[i] > 1e-6 else 0.0
+    w.thaw_seconds[i] += thawing
+    w.thaw_water[i] += thawing * s.organic_water[i]
     w.air_sum[i] += w.air[i]
     w.canopy_sum[i] += s.canopy[i]
     w.ground_sum[i] += s.ground[i]
     w.top_sum[i] += w.soil_top[i]
+    w.organic_sum[i] += w.organic[i]
     w.surface_sum[i] += w.surface[i]
     w.deep_sum[i] += w.deep[i]
     r.canopy_residual_w_m2[i] = max(r.canopy_residual_w_m2[i], abs(w.residual[i]))
@@ -141,6 +148,7 @@ def end_day(b, day, steps, daily):
         r.snow_days[i] += 1.0 if snowy else 0.0
         r.snow_off_doy[i] = day + 2.0 if snowy and spring else r.snow_off_doy[i]
         r.peak_swe_mm[i] = max(r.peak_swe_mm[i], s.swe[i])
+        r.peak_snow_depth_m[i] = max(r.peak_snow_depth_m[i], snow_depth(b, i))
         r.max_lai[i] = max(r.max_lai[i], w.lai_conifer[i] + w.lai_deciduous[i])
         r.air_temperature_c[i] += air / DAYS_PER_YEAR
         r.ground_temperature_c[i] += w.ground_sum[i] / (steps * DAYS_PER_YEAR)
@@ -186,6 +194,9 @@ def write_day(b, steps, row):
         row.lai[i] = w.lai_conifer[i] + w.lai_deciduous[i]
         row.organic_layer_m[i] = s.organic_depth[i]
         row.soil_top_temperature_c[i] = w.top_sum[i] / steps
+        row.snow_depth_m[i] = snow_depth(b, i)
+        row.organic_water_mm[i] = s.organic_water[i]
+        row.organic_temperature_c[i] = w.organic_sum[i] / steps
 
 
 @phase

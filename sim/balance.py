@@ -12,6 +12,7 @@ def stored_energy(b, i) -> float:
     return (
         s.trunk_capacity[i] * s.trunk[i]
         + ground_capacity(s.swe[i], b.p.skin_heat_capacity[i]) * s.ground[i]
+        + s.organic_heat[i]
         + s.surface_heat[i]
         + s.deep_heat[i]
         - LATENT_HEAT_FUSION * (s.swe[i] + s.canopy_snow[i])
@@ -20,9 +21,9 @@ def stored_energy(b, i) -> float:
 
 @compiled
 def stored_water(b, i) -> float:
-    """Water of canopy, snow and soil [mm]."""
+    """Water of canopy, snow, organic layer and soil [mm]."""
     s = b.s
-    return s.swe[i] + s.canopy_snow[i] + s.canopy_rain[i] + s.soil_water[i]
+    return s.swe[i] + s.canopy_snow[i] + s.canopy_rain[i] + s.organic_water[i] + s.soil_water[i]
 
 
 @compiled

@@ -1,14 +1,15 @@
-"""Evaporation by net radiation (Priestley and Taylor 1972), of leaves, wet canopy and bare ground; vapour of snow."""
+"""Evaporation: of leaves and wet canopy by net radiation (Priestley and Taylor 1972), of moss and snow by vapour
+pressure."""
 
 from sim.jit import compiled, phase
+from sim.organic import liquid_water, wetness
 from sim.physical_constants import (
-    FREEZING_POINT_K,
+    AIR_HEAT_CAPACITY,
     LATENT_HEAT_SUBLIMATION,
     LATENT_HEAT_VAPORISATION,
     PSYCHROMETRIC_PER_HPA,
     VAPOUR_RATIO,
 )
-from sim.radiation import black_body, longwave_down
 from sim.weather import SATURATION_AT_FREEZING_HPA, saturation_pressure, saturation_slope
 
 
@@ -38,23 +39,39 @@ def open_stomata(b, i, dry_conifer, dry_deciduous):
 
 
 @compiled
-def snow_vapour(b, seconds):
-    """Latent heat from lying snow at the start of the step, and its slope by the ground's temperature."""
-    s, w = b.s, b.w
+def moss_conductance(exchange, wetness, resistance) -> float:
+    """Conductance for vapour [m s-1] between moss and air: the air's exchange, and in series with it the moss's, whose
+    resistance climbs sharply with drying (Bond-Lamberty et al. 2010). resistance : of wet moss [s m-1]."""
+    open_share = wetness * wetness
+    return exchange * open_share / (open_share + exchange * resistance) if wetness > 0.0 else 0.0
+
+
+@compiled
+def ground_vapour(b, seconds):
+    """Latent heat from lying snow, or else from the thawed moss floor, at the start of the step; its slope by the
+    ground's temperature."""
+    s, p, w = b.s, b.p, b.w
     for i in range(len(s.swe)):
-        ice = min(s.ground[i], 0.0)  # snow that falls on a warm skin is at 0 degC
-        over_ice = saturation_pressure(ice)
-        # At 0 degC, no more vapour is exchanged within the step than snow lies there: the limit is on the conductance,
-        # so that the ground's equation and what is moved agree.
-        drying = max(abs(SATURATION_AT_FREEZING_HPA - w.humidity[i]), 1e-3)
-        transfer = min(w.vapour_density[i] * w.ground_exchange[i], s.swe[i] / (seconds * drying))
-        w.snow_latent[i] = LATENT_HEAT_SUBLIMATION * transfer * (over_ice - w.humidity[i])
-        w.latent_slope[i] = LATENT_HEAT_SUBLIMATION * transfer * saturation_slope(ice, over_ice)
+        snow = s.swe[i] > 0.0
+        surface = min(s.ground[i], 0.0) if snow else s.ground[i]  # snow that falls on a warm skin is at 0 degC
+        saturated = saturation_pressure(surface)
+        # The windless exchange moves vapour off the moss, too: it stands for eddies that reach the floor in gusts.
+        exchange = max(w.ground_exchange[i], p.minimum_conductance[i] / (w.air_density[i] * AIR_HEAT_CAPACITY))
+        moss = moss_conductance(exchange, wetness(b, i), p.moss_resistance[i]) if s.ground[i] > 0.0 else 0.0
+        conductance = w.ground_exchange[i] if snow else moss
+        # No more vapour is exchanged within the step than there is water, by snow at 0 degC: the limit is on the
+        # conductance, so that the ground's equation and what is moved agree.
+        store = s.swe[i] if snow else liquid_water(b, i)
+        drying = max(abs((SATURATION_AT_FREEZING_HPA if snow else saturated) - w.humidity[i]), 1e-3)
+        transfer = min(w.vapour_density[i] * conductance, store / (seconds * drying))
+        heat = LATENT_HEAT_SUBLIMATION if snow else LATENT_HEAT_VAPORISATION
+        w.ground_latent[i] = heat * transfer * (saturated - w.humidity[i])
+        w.latent_slope[i] = heat * transfer * saturation_slope(surface, saturated)
 
 
 @compiled
 def evaporation(b, seconds):
-    """Evaporation of leaves and wet canopy per net radiation, and the latent heat of the ground."""
+    """Evaporation of leaves and wet canopy per net radiation."""
     s, p, w = b.s, b.p, b.w
     for i in range(len(s.swe)):
         slope = w.saturation_slope[i]
@@ -67,11 +84,3 @@ def evaporation(b, seconds):
         w.dry_coefficient[i] = dry * scale
         w.wet_coefficient[i] = wet * scale
         w.wet_limit[i] = LATENT_HEAT_VAPORISATION * (1.0 / seconds) * s.canopy_rain[i]
-
-        sky_and_canopy = longwave_down(w.sky[i], w.air_emission[i], w.longwave_cover[i])
-        emission = black_body(s.ground[i] + FREEZING_POINT_K)
-        available = w.ground_sw[i] + p.ground_emissivity[i] * (sky_and_canopy - emission)
-        thawed = w.air[i] > 0.0 and s.ground[i] > 0.0
-        moist = min(p.priestley_taylor_ground[i] * equilibrium * w.water_stress[i], 1.0) if thawed else 0.0
-        snow_latent = w.snow_latent[i]  # loaded first, as in `sim.wind.wind_exchange`
-        w.ground_latent[i] = snow_latent if s.swe[i] > 0.0 else moist * max(available, 0.0)

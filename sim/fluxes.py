@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from sim.account import add_step, total_sensible, total_vapour
 from sim.jit import compiled
+from sim.organic import liquid_water, wet_organic_layer
 from sim.photosynthesis import energy_of_photosynthesis
 from sim.physical_constants import (
     FREEZING_POINT_K,
@@ -30,7 +31,8 @@ class Heat(NamedTuple):
     ground_to_air: float
     canopy_to_trunk: float
     trunk_to_ground: float
-    ground_to_surface: float
+    ground_to_organic: float
+    organic_to_surface: float
     surface_to_deep: float
     deep_to_boundary: float
 
@@ -41,21 +43,24 @@ class Vapour(NamedTuple):
     leaves: float
     wet_canopy: float
     snow: float
-    soil: float
+    moss: float
 
 
 @compiled
 def move_heat_and_water(b, seconds):
     """Move a step's heat and water between the stores; what crossed the stand's boundary is noted and accounted for."""
+    w = b.w
     for i in range(len(b.s.swe)):
         net_radiation, ground_longwave = radiate(b, i)
         heat = conduct(b, i)
         vapour = evaporate(b, i, seconds)
         melted, carried = warm_ground(b, i, ground_longwave, heat, vapour, seconds)
         warm_soil_and_trunk(b, i, heat, seconds)
-        excess = fill_soil(b, i, vapour, melted)
-        cross_boundary(b, i, net_radiation, heat, vapour, excess, carried, seconds)
-        add_step(b, i, net_radiation, heat, vapour, excess, carried, seconds)
+        drained, carried_by_water = wet_organic_layer(b, i, w.infiltration[i], melted, vapour.moss)
+        excess = fill_soil(b, i, vapour, drained)
+        advected = w.advected[i] - carried + carried_by_water
+        cross_boundary(b, i, net_radiation, heat, vapour, excess, advected, seconds)
+        add_step(b, i, net_radiation, heat, vapour, excess, advected, seconds)
 
 
 @compiled
@@ -78,7 +83,8 @@ def conduct(b, i):
     w = b.w
     canopy, ground = w.trial[i], w.ground_new[i]
     trunk = w.trunk_base[i] + w.trunk_by_canopy[i] * canopy + w.trunk_by_ground[i] * ground
-    surface = w.surface_base[i] + w.surface_by_ground[i] * ground
+    organic = w.organic_base[i] + w.organic_by_ground[i] * ground
+    surface = w.surface_base[i] + w.surface_by_organic[i] * organic
     deep = w.deep_base[i] + w.deep_by_surface[i] * surface
     heat = Heat(
         w.canopy_air[i] * (canopy - w.air[i]),
@@ -86,27 +92,29 @@ def conduct(b, i):
         w.ground_conductance[i] * (ground - w.air[i]),
         w.trunk_canopy[i] * (canopy - trunk),
         w.trunk_ground[i] * (trunk - ground),
-        w.surface_conductance[i] * (ground - surface),
+        w.organic_conductance[i] * (ground - organic),
+        w.surface_conductance[i] * (organic - surface),
         w.deep_conductance[i] * (surface - deep),
         w.boundary_conductance[i] * (deep - boundary_temperature(b, i)),
     )
-    w.soil_top[i] = surface + heat.ground_to_surface * w.upper_soil[i]
+    w.soil_top[i] = surface + heat.organic_to_surface * w.upper_soil[i]
     return heat
 
 
 @compiled
 def evaporate(b, i, seconds):
-    """Water that leaves the leaves, the wet canopy, and the ground or its snow."""
+    """Water that leaves the leaves, the wet canopy, and the snow or else the moss."""
     s, w = b.s, b.w
     to_vapour = seconds / LATENT_HEAT_VAPORISATION  # mm per W m-2
     available = max(w.net[i] - w.fixed[i], 0.0)
     snow = s.swe[i] > 0.0
-    latent = w.ground_latent[i] + w.latent_slope[i] * (min(w.ground_new[i], 0.0) - min(s.ground[i], 0.0))
+    new, old = w.ground_new[i], s.ground[i]
+    latent = w.ground_latent[i] + w.latent_slope[i] * (min(new, 0.0) - min(old, 0.0) if snow else new - old)
     return Vapour(
         w.dry_coefficient[i] * available * to_vapour,
         min(w.wet_coefficient[i] * available, w.wet_limit[i]) * to_vapour,
         min(latent * (seconds / LATENT_HEAT_SUBLIMATION), s.swe[i]) if snow else 0.0,
-        0.0 if snow else latent * to_vapour,
+        0.0 if snow else min(latent * to_vapour, liquid_water(b, i)),
     )
 
 
@@ -117,11 +125,11 @@ def warm_ground(b, i, longwave, heat, vapour, seconds):
     [J m-2]."""
     s, p, w = b.s, b.p, b.w
     snow = s.swe[i] > 0.0
-    latent = (LATENT_HEAT_SUBLIMATION * vapour.snow + LATENT_HEAT_VAPORISATION * vapour.soil) * (1.0 / seconds)
+    latent = (LATENT_HEAT_SUBLIMATION * vapour.snow + LATENT_HEAT_VAPORISATION * vapour.moss) * (1.0 / seconds)
     carried = ICE_HEAT_CAPACITY * vapour.snow * s.ground[i]
     enthalpy = ground_capacity(s.swe[i], p.skin_heat_capacity[i]) * s.ground[i] - carried
     enthalpy += seconds * (
-        w.ground_sw[i] + longwave - heat.ground_to_air - heat.ground_to_surface + heat.trunk_to_ground - latent
+        w.ground_sw[i] + longwave - heat.ground_to_air - heat.ground_to_organic + heat.trunk_to_ground - latent
     )
     left = s.swe[i] - vapour.snow
     melted = min(max(enthalpy, 0.0) * (1.0 / LATENT_HEAT_FUSION), left) if snow else 0.0
@@ -132,27 +140,28 @@ def warm_ground(b, i, longwave, heat, vapour, seconds):
 
 @compiled
 def warm_soil_and_trunk(b, i, heat, seconds):
-    """Canopy, trunk and soil take what reaches them."""
+    """Canopy, trunk, organic layer and soil take what reaches them."""
     s = b.s
     s.canopy[i] = b.w.trial[i]
     s.trunk[i] += seconds * (heat.canopy_to_trunk - heat.trunk_to_air - heat.trunk_to_ground) / s.trunk_capacity[i]
-    s.surface_heat[i] += seconds * (heat.ground_to_surface - heat.surface_to_deep)
+    s.organic_heat[i] += seconds * (heat.ground_to_organic - heat.organic_to_surface)
+    s.surface_heat[i] += seconds * (heat.organic_to_surface - heat.surface_to_deep)
     s.deep_heat[i] += seconds * (heat.surface_to_deep - heat.deep_to_boundary)
 
 
 @compiled
-def fill_soil(b, i, vapour, melted) -> float:
-    """Water of canopy and soil; returns what the bucket cannot hold, which runs off."""
+def fill_soil(b, i, vapour, drained) -> float:
+    """Water of canopy and soil, after what drained to it; returns what the bucket cannot hold, which runs off."""
     s = b.s
     s.canopy_rain[i] = max(s.canopy_rain[i] - vapour.wet_canopy, 0.0)
-    water = s.soil_water[i] + b.w.infiltration[i] + melted - vapour.leaves - vapour.soil
+    water = s.soil_water[i] + drained - vapour.leaves
     excess = runoff(water, b.p.max_water_content_mm[i])
     s.soil_water[i] = water - excess
     return excess
 
 
 @compiled
-def cross_boundary(b, i, net_radiation, heat, vapour, excess, carried, seconds):
+def cross_boundary(b, i, net_radiation, heat, vapour, excess, advected, seconds):
     """What energy and water the stand gained through its boundary."""
     w = b.w
     all_vapour = total_vapour(b, i, vapour)
@@ -161,7 +170,6 @@ def cross_boundary(b, i, net_radiation, heat, vapour, excess, carried, seconds):
         seconds * (net_radiation - total_sensible(heat) - growth - heat.deep_to_boundary)
         - LATENT_HEAT_VAPORISATION * all_vapour
         - LATENT_HEAT_FUSION * w.snow[i]
-        + w.advected[i]
-        - carried
+        + advected
     )
     w.water_gain[i] = w.precipitation_step[i] - all_vapour - excess

@@ -1,17 +1,40 @@
-"""Snow on the ground: albedo, insulation, exchange with the air. The snow node is the snow's surface; its whole
-depth lies between it and the soil. Without snow the node is the ground's skin of moss and litter."""
+"""Snow on the ground: density, albedo, insulation. The snow node is the snow's surface; its whole depth lies between
+it and the organic layer. Without snow the node is the ground's skin of moss and litter."""
+
+import math
 
 from sim.jit import compiled, phase
-from sim.physical_constants import ICE_HEAT_CAPACITY, SECONDS_PER_HOUR
+from sim.mathematics import exponential
+from sim.physical_constants import GRAVITY, ICE_HEAT_CAPACITY, SECONDS_PER_DAY, SECONDS_PER_HOUR
 
 SNOW_DAY_MM = 1.0  # of snow, less than which is none to a day's wind and to the record
 MELTING_FROM_C = -0.01  # a melting pack is at 0 degC only to rounding
 
 
 @compiled
-def bulk_density(cover, sheltered, exposed) -> float:
-    """Snow density [kg m-3] between a closed canopy's and the open's."""
-    return exposed + (sheltered - exposed) * cover
+def fresh_density(air, wind, at_freezing, per_degree, by_wind, least) -> float:
+    """Density of falling snow [kg m-3], by air temperature [degC] and wind [m s-1] (Pahaut 1976; Vionnet et al. 2012,
+    Eq. 1)."""
+    return max(at_freezing + per_degree * air + by_wind * math.sqrt(wind), least)
+
+
+@compiled
+def mixed_density(swe, density, snowfall, fresh) -> float:
+    """Density [kg m-3] of the pack with the snow that fell [mm]: their depths add up."""
+    depths = swe * fresh + snowfall * density
+    return (swe + snowfall) * density * fresh / depths if depths > 0.0 else density
+
+
+@compiled
+def settling(
+    swe, density, temperature, viscosity, stiffer_cold, stiffer_dense, rate, slower_cold, slower_dense, metamorphism
+) -> float:
+    """Relative gain of density [s-1]: under the weight of half the pack, and by metamorphism, which slows beyond a
+    density (Anderson 1976; as in FSM2, Essery 2015). temperature : of the snow [degC]."""
+    weight = 0.5 * GRAVITY * swe
+    stiffness = viscosity * exponential(stiffer_dense * density - stiffer_cold * temperature)
+    dense = max(density - metamorphism, 0.0)
+    return weight / stiffness + rate * exponential(slower_cold * temperature - slower_dense * dense)
 
 
 @compiled
@@ -52,13 +75,40 @@ def ground_capacity(swe, skin) -> float:
 
 @phase
 def snow_properties(b):
-    """Density of the day's snow, its resistance to heat, and how much of it hides the ground."""
-    p, w = b.p, b.w
-    for i in range(len(b.s.swe)):
-        crowns = w.cover_conifer[i] + w.cover_deciduous[i]
-        w.snow_density[i] = bulk_density(crowns, p.snow_density_sheltered[i], p.snow_density_open[i])
-        w.snow_resistance[i] = 1.0 / (w.snow_density[i] * conductivity(w.snow_density[i]))
-        w.snow_hiding[i] = 1.0 / (w.snow_density[i] * p.snow_cover_depth_m[i])
+    """The day's snow: its resistance to heat, and how much of it hides the ground."""
+    s, p, w = b.s, b.p, b.w
+    for i in range(len(s.swe)):
+        w.snow_resistance[i] = 1.0 / (s.snow_density[i] * conductivity(s.snow_density[i]))
+        w.snow_hiding[i] = 1.0 / (s.snow_density[i] * p.snow_cover_depth_m[i])
+
+
+@phase
+def settle_snow(b, steps):
+    """A day of settling, at the mean of the snow's surface over the day and of the organic layer below it.
+
+    steps : time steps of the day.
+    """
+    s, p, w = b.s, b.p, b.w
+    for i in range(len(s.swe)):
+        gain = settling(
+            s.swe[i],
+            s.snow_density[i],
+            min(0.5 * (w.ground_sum[i] / steps + w.organic[i]), 0.0),
+            p.snow_viscosity[i],
+            p.snow_viscosity_by_cold[i],
+            p.snow_viscosity_by_density[i],
+            p.snow_metamorphism[i],
+            p.snow_metamorphism_by_cold[i],
+            p.snow_metamorphism_by_density[i],
+            p.snow_metamorphism_density[i],
+        )
+        s.snow_density[i] = min(s.snow_density[i] * (1.0 + SECONDS_PER_DAY * gain), p.snow_density_largest[i])
+
+
+@compiled
+def snow_depth(b, i) -> float:
+    """Depth of a lane's snow [m]."""
+    return b.s.swe[i] / b.s.snow_density[i]
 
 
 @compiled
@@ -67,6 +117,15 @@ def lay_snow(b, i, ground_snow, seconds):
     s, p, w = b.s, b.p, b.w
     w.advected[i] = ICE_HEAT_CAPACITY * ground_snow * min(w.air[i], 0.0)
     heat = ground_capacity(s.swe[i], p.skin_heat_capacity[i]) * s.ground[i] + w.advected[i]
+    fresh = fresh_density(
+        w.air[i],
+        w.wind_below[i],
+        p.snow_density_fresh[i],
+        p.snow_density_fresh_per_c[i],
+        p.snow_density_fresh_by_wind[i],
+        p.snow_density_least[i],
+    )
+    s.snow_density[i] = mixed_density(s.swe[i], s.snow_density[i], ground_snow, fresh)
     s.swe[i] += ground_snow
     mixed = heat / ground_capacity(s.swe[i], p.skin_heat_capacity[i])
     s.ground[i] = mixed if ground_snow > 0.0 else s.ground[i]

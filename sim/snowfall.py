@@ -25,12 +25,10 @@ def snowfall(b, seconds):
 
 @compiled
 def no_snow(b):
-    """The same without any snow, which then gives off no vapour either (see `sim.evaporation.snow_vapour`)."""
+    """The same without any snow."""
     w = b.w
     for i in range(len(b.s.swe)):
         w.canopy_sublimation[i] = 0.0
         w.canopy_melt[i] = 0.0
         w.advected[i] = 0.0
-        w.snow_latent[i] = 0.0
-        w.latent_slope[i] = 0.0
         b.s.albedo[i] = b.p.snow_albedo_fresh[i]

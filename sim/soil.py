@@ -1,11 +1,9 @@
-"""Soil heat: moss and organic layer, two nodes that freeze by enthalpy, and the fixed boundary far below.
+"""Mineral soil: two nodes that freeze by enthalpy, and the fixed boundary far below.
 
 Enthalpy in J m-2 with 0 at thawed soil of 0 degC. The water that freezes is a property of the column, apart from
 the bucket of `sim.water`. Where several functions divide by the freezing range, each multiplies by 1 / range: the
 compiler makes one division of them all.
 """
-
-import math
 
 from sim.jit import compiled
 from sim.physical_constants import FREEZING_POINT_K, LATENT_HEAT_FUSION, WATER_DENSITY
@@ -82,50 +80,6 @@ def in_series(first_depth, first, second_depth, second) -> float:
 
 
 @compiled
-def organic_layer(depth, conifer, deciduous, depth_conifer, depth_deciduous, depth_open, growth, loss_years) -> float:
-    """Depth of the organic layer [m] a year later, toward the equilibrium of the canopy above it."""
-    equilibrium = conifer * depth_conifer + deciduous * depth_deciduous + (1.0 - conifer - deciduous) * depth_open
-    gap = equilibrium - depth
-    return depth + (min(gap, growth) if gap > 0.0 else gap / loss_years)
-
-
-@compiled
-def thaw_depth(
-    organic,
-    warmth,
-    seconds,
-    deep,
-    boundary,
-    deep_node,
-    boundary_depth,
-    thawed_conductivity,
-    frozen_conductivity,
-    organic_conductivity,
-    thawed_capacity,
-    frozen_capacity,
-    latent,
-):
-    """Active-layer depth [m], from the organic surface; down to the permafrost where that lies below the deep node.
-
-    Stefan's: what a season's warmth at the ground [K s], `seconds` long, conducts through organic layer and thawed soil
-    melts the water [latent, J m-3], warms thawed soil to half the mean temperature of its top, and goes on into soil
-    as cold as the deep node in the year's mean (Carslaw and Jaeger 1959, 2.4: 2 dT sqrt(k C t / pi)).
-    Capacities in J m-3 K-1.
-    """
-    if deep > 0.0:
-        share = deep / (deep - boundary) if boundary < 0.0 else 1.0
-        return organic + deep_node + share * (boundary_depth - deep_node)
-    top = 0.5 * warmth / seconds if seconds > 0.0 else 0.0
-    heat = latent + 0.5 * thawed_capacity * top
-    cold = -2.0 * deep * math.sqrt(frozen_conductivity * frozen_capacity * seconds / math.pi)
-    above = organic * thawed_conductivity / organic_conductivity
-    linear = above * heat + 0.5 * cold
-    square = linear * linear + 2.0 * heat * (thawed_conductivity * warmth - above * cold)
-    front = (math.sqrt(max(square, 0.0)) - linear) / heat if heat > 0.0 else 0.0
-    return organic + min(max(front, 0.0), boundary_depth)
-
-
-@compiled
 def soil_nodes(b, i):
     """Capacities and distances of the two nodes, for the year."""
     p, w = b.p, b.w
@@ -153,63 +107,9 @@ def boundary_temperature(b, i) -> float:
 
 
 @compiled
-def soil_conductances(b, i):
-    """A lane's two nodes at the start of the step, and the conductances between ground, nodes and boundary."""
-    s, p, w = b.s, b.p, b.w
-    span = p.soil_freezing_range_k[i]
+def soil_temperatures(b, i):
+    """A lane's two nodes at the start of the step."""
+    s, w = b.s, b.w
+    span = b.p.soil_freezing_range_k[i]
     w.surface[i] = temperature(s.surface_heat[i], w.surface_thawed[i], w.surface_frozen[i], w.surface_latent[i], span)
     w.deep[i] = temperature(s.deep_heat[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], span)
-    thawed, frozen = p.soil_conductivity[i], p.soil_conductivity[i] * w.frozen_ratio[i]
-    # A node thicker than the front's daily reach freezes and thaws from above: its upper half is as the ground is.
-    upper = conductivity(frozen_share(s.ground[i], span), thawed, frozen)
-    lower = conductivity(frozen_share(w.surface[i], span), thawed, frozen)
-    deep = conductivity(frozen_share(w.deep[i], span), thawed, frozen)
-    below = conductivity(frozen_share(0.5 * (w.deep[i] + boundary_temperature(b, i)), span), thawed, frozen)
-    organic = conductivity(
-        frozen_share(0.5 * (s.ground[i] + w.surface[i]), span),
-        p.organic_conductivity_thawed[i],
-        p.organic_conductivity_frozen[i],
-    )
-    w.upper_soil[i] = w.half_surface[i] / upper
-    above_and_below = s.swe[i] * w.snow_resistance[i] + w.upper_soil[i]  # of the organic layer
-    w.surface_conductance[i] = in_series(above_and_below, 1.0, s.organic_depth[i] * p.moss[i], organic)
-    w.deep_conductance[i] = in_series(w.half_surface[i], lower, w.above_deep_node[i], deep)
-    w.boundary_conductance[i] = below * w.per_below_deep_node[i]
-
-
-@compiled
-def renew_organic_layer(b, i):
-    """A year of growth or loss of the organic layer."""
-    s, p, w = b.s, b.p, b.w
-    s.organic_depth[i] = organic_layer(
-        s.organic_depth[i],
-        w.cover_conifer[i],
-        w.cover_deciduous[i],
-        p.organic_depth_conifer_m[i],
-        p.organic_depth_deciduous_m[i],
-        p.organic_depth_open_m[i],
-        p.organic_growth_m_yr[i],
-        p.organic_loss_years[i],
-    )
-
-
-@compiled
-def active_layer(b, i) -> float:
-    """Active-layer depth of the year [m], from its warmth and its mean deep temperature."""
-    s, p, w, r = b.s, b.p, b.w, b.r
-    thawed = p.soil_heat_capacity_thawed[i]
-    return thaw_depth(
-        s.organic_depth[i] * p.moss[i],
-        w.thaw_warmth[i],
-        w.thaw_seconds[i],
-        r.deep_soil_temperature_c[i],
-        boundary_temperature(b, i),
-        p.deep_soil_node_m[i],
-        p.boundary_depth_m[i],
-        p.soil_conductivity[i],
-        p.soil_conductivity[i] * w.frozen_ratio[i],
-        p.organic_conductivity_thawed[i],
-        thawed,
-        where_it_freezes(p.soil_freezing[i], thawed, p.soil_heat_capacity_frozen[i]),
-        w.surface_latent[i] / p.surface_soil_depth_m[i],
-    )

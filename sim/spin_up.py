@@ -8,18 +8,20 @@ import math
 
 import numpy as np
 
-from sim import soil
+from sim import organic, soil
 from sim.demography import AGE_CLASSES, AGES, OLDEST, first_ages
 from sim.jit import uncompiled
 from sim.parameters import check_mapping
-from sim.physical_constants import FREEZING_POINT_K
+from sim.physical_constants import FREEZING_POINT_K, WATER_DENSITY
 from sim.state import DAYS, STATE
 
 enthalpy, node_capacities = uncompiled(soil.enthalpy), uncompiled(soil.node_capacities)
+layer_capacities = uncompiled(organic.layer_capacities)
 
 SPIN_UP_YEARS = 8
 SPIN_UP_STEPS_PER_DAY = 12
 LONGEST_LEAP = 15.0  # years
+FIRST_SNOW_DENSITY = 200.0  # kg m-3
 SEASONAL_RANGE_K = 4.0
 GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
 
@@ -100,10 +102,12 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         biomass = min(biomass, density * LARGEST_STEM_KGC * 1e-4) if density > 0.0 else biomass
 
     crowns = 1.0 - math.exp(-density * 1e-4 * parameters["crown_area_conifer_m2"])
-    organic = (
+    depth = (
         crowns * (mix * parameters["organic_depth_conifer_m"] + (1.0 - mix) * parameters["organic_depth_deciduous_m"])
         + (1.0 - crowns) * parameters["organic_depth_open_m"]
     )
+    depth = stocks.get("organic_layer_m", depth)
+    organic_water = 0.8 * WATER_DENSITY * parameters["organic_water_held"] * depth
     mean = parameters["mean_annual_temperature_c"]
     boundary = parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K
     winter = mean - parameters["seasonal_amplitude_c"]
@@ -112,13 +116,16 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         "deciduous_biomass": (1.0 - mix) * biomass,
         "soil_carbon": stocks["soil_kgc_m2"],
         "products": stocks.get("hwp_kgc_m2", 0.0),
-        "organic_depth": stocks.get("organic_layer_m", organic),
+        "organic_depth": depth,
         "canopy": winter,
         "trunk": winter,
         "ground": min(winter, 0.0),
+        "organic_heat": enthalpy(0.5 * (mean + winter), *organic_node(parameters, depth, organic_water)),
+        "organic_water": organic_water,
         "surface_heat": enthalpy(mean - 1.0, *soil_node(parameters, "surface")),
         "deep_heat": enthalpy(0.5 * (mean + 2.0 + boundary), *soil_node(parameters, "deep")),
         "swe": 40.0 if winter < 0.0 else 0.0,
+        "snow_density": FIRST_SNOW_DENSITY,
         "albedo": parameters["snow_albedo_fresh"],
         "soil_water": 0.7 * parameters["max_water_content_mm"],
     }
@@ -157,6 +164,13 @@ def soil_node(parameters: dict, node: str) -> tuple[float, float, float, float]:
     )
     surface, deep = node_capacities(*(parameters[name] for name in names))
     return *(surface if node == "surface" else deep), parameters["soil_freezing_range_k"]
+
+
+def organic_node(parameters: dict, depth: float, water: float) -> tuple[float, float, float, float]:
+    """The same of an organic layer of so much depth [m] and water [mm]."""
+    return *layer_capacities(
+        parameters["soil_freezing"], depth, parameters["organic_heat_capacity_dry"], water
+    ), parameters["soil_freezing_range_k"]
 
 
 def climate_draws() -> dict[str, np.ndarray]:

@@ -26,9 +26,12 @@ STATE = {
     "trunk": ("degC", "trunk temperature"),
     "trunk_capacity": ("J m-2 K-1", "heat capacity of the trunks"),
     "ground": ("degC", "temperature of the snow surface, or of the ground's skin"),
+    "organic_heat": ("J m-2", "enthalpy of the organic layer"),
+    "organic_water": ("mm", "water and ice of the organic layer"),
     "surface_heat": ("J m-2", "enthalpy of the surface soil"),
     "deep_heat": ("J m-2", "enthalpy of the deep soil"),
     "swe": ("mm", "snow on the ground, as water"),
+    "snow_density": ("kg m-3", "density of the snow"),
     "albedo": ("1", "albedo of the snow"),
     "canopy_rain": ("mm", "rain held by the canopy"),
     "canopy_snow": ("mm", "snow held by the canopy"),
@@ -75,10 +78,12 @@ RECORD = {
     "snowfall_mm": ("mm", "of which snow"),
     "evapotranspiration_mm": ("mm", "transpiration, evaporation and sublimation"),
     "transpiration_mm": ("mm", "of which through leaves"),
+    "floor_evaporation_mm": ("mm", "of which from moss and understorey, snow-free"),
     "runoff_mm": ("mm", "water beyond the bucket's capacity"),
     "sublimation_mm": ("mm", "snow sublimated, canopy and ground"),
     "canopy_sublimation_mm": ("mm", "of which from the canopy"),
     "peak_swe_mm": ("mm", "largest snowpack of a day"),
+    "peak_snow_depth_m": ("m", "deepest snow of a day's end"),
     "snow_off_doy": ("day of year", "day after the last snow of spring"),
     "snow_days": ("day", "days with snow"),
     "shortwave_mj_m2": ("MJ m-2", "incoming shortwave"),
@@ -94,7 +99,7 @@ RECORD = {
     "active_layer_depth_m": ("m", "deepest thaw, from the organic surface"),
     "boundary_warming_mj_m2": ("MJ m-2", "heat into the permafrost boundary"),
     "boundary_cooling_mj_m2": ("MJ m-2", "heat out of it"),
-    "snow_heat_mj_m2": ("MJ m-2", "heat of cold snow that fell, less that of snow that sublimated"),
+    "advected_heat_mj_m2": ("MJ m-2", "heat that cold snow and warm rain brought, less what vapour and drainage took"),
     "deep_heat_gain_mj_m2": ("MJ m-2", "heat gained by the deep soil"),
     "growing_season_days": ("day", "days with a mean above 5 degC"),
     "max_lai": ("m2 m-2", "largest leaf area"),
@@ -147,6 +152,9 @@ DAILY = {
     "lai": ("m2 m-2", "leaf area of both species"),
     "organic_layer_m": ("m", "depth of moss and organic layer"),
     "soil_top_temperature_c": ("degC", "mean at the top of the mineral soil"),
+    "snow_depth_m": ("m", "depth of the snow at the day's end"),
+    "organic_water_mm": ("mm", "water and ice of the organic layer at the day's end"),
+    "organic_temperature_c": ("degC", "mean in the middle of the organic layer"),
 }
 
 #: Columns of an observed forcing, in order.
@@ -173,13 +181,14 @@ lai_conifer lai_deciduous latent_slope leaf_coefficient leaf_conifer leaf_decidu
 light_use_deciduous log_q10 longwave_cover low mean_temperature melt_span minimum_temperature mix net optical_conifer
 optical_deciduous per_below_deep_node per_rain_capacity precipitation precipitation_step products_before products_decay
 rain rain_capacity reflected reflected_sum residual saturation_slope share_conifer shortwave shortwave_sum sin_latitude
-sin_peak sin_warmest sky sky_conifer sky_deciduous snow snow_area snow_density snow_efficiency snow_hiding snow_latent
+sin_peak sin_warmest sky sky_conifer sky_deciduous snow snow_area snow_efficiency snow_hiding
 snow_log snow_resistance snow_wind soil_before soil_heat_sum soil_rate soil_top stems_before stems_gain summer_down
-summer_up sun_a sun_b surface surface_base surface_by_ground surface_conductance surface_frozen surface_latent
+summer_up sun_a sun_b surface surface_base surface_conductance surface_frozen surface_latent
 surface_sum surface_thawed temperature_stress_conifer temperature_stress_deciduous thaw_seconds thaw_warmth
 top_of_canopy top_sum transpiration_conifer transpiration_deciduous trial trunk_air trunk_base trunk_by_canopy
 trunk_by_ground trunk_canopy trunk_ground unloading_rate upper_soil vapour vapour_density water_before water_gain
 water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
+organic organic_base organic_by_ground organic_conductance organic_sum surface_by_organic thaw_water
 """.split()
 
 

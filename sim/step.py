@@ -7,9 +7,10 @@ the stores alone that nothing was lost.
 from sim.balance import balance, note_stores
 from sim.canopy import solve_canopy
 from sim.carbon import move_carbon
-from sim.evaporation import evaporation, snow_vapour
+from sim.evaporation import evaporation, ground_vapour
 from sim.fluxes import move_heat_and_water
 from sim.forcing import moisture
+from sim.ground_heat import ground_temperatures
 from sim.interception import rainfall
 from sim.jit import compiled
 from sim.response import answer_to_canopy
@@ -34,9 +35,8 @@ def simulate_step(b, seconds):
         no_snow(b)
     rainfall(b)
     ground_exchange(b)
-    if snow:
-        snow_vapour(b, seconds)
     evaporation(b, seconds)
+    ground_vapour(b, seconds)
     answer_to_canopy(b, seconds)
     solve_canopy(b)
     move_heat_and_water(b, seconds)
@@ -46,8 +46,9 @@ def simulate_step(b, seconds):
 
 @compiled
 def begin_step(b, seconds):
-    """The stores before the step; its air and its soil's moisture."""
+    """The stores before the step and the temperatures of the ground; the step's air and its soil's moisture."""
     for i in range(len(b.s.swe)):
         note_stores(b, i)
+        ground_temperatures(b, i)
         moisture(b, i)
         drought_stress(b, i, seconds)

@@ -12,9 +12,11 @@ from sim.forcing import hour_angles, site_angles, step_weather
 from sim.interception import unloading_rates
 from sim.jit import phase
 from sim.management import manage
+from sim.organic import renew_organic_layer
 from sim.photosynthesis import dryness_slopes
 from sim.physical_constants import SECONDS_PER_DAY
-from sim.soil import renew_organic_layer, soil_nodes
+from sim.snow import settle_snow
+from sim.soil import soil_nodes
 from sim.step import simulate_step
 from sim.structure import crown_areas
 from sim.trunk import grow_trunk
@@ -44,6 +46,7 @@ def simulate_year(block, steps_per_day, days, observed, daily):
         for t in range(steps_per_day):
             step_weather(b, t, hours, seconds, today)
             simulate_step(b, seconds)
+        settle_snow(b, steps_per_day)
         end_day(b, day, steps_per_day, daily)
     end_year(b)
 

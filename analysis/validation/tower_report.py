@@ -91,15 +91,13 @@ def poker_flat_days(repeats: int, stand=tower_stands.US_PRR, measured_spring: bo
 
 
 def temperature_in_moss(modelled: pd.DataFrame, depth: float) -> pd.Series:
-    """Modelled temperature [degC] at a depth [m] in the organic layer: from the top of the mineral soil up, with the
-    day's ground heat and the layer's conductivity (`sim.soil.soil_conductances`)."""
-    freezing = CONSTANTS["soil_freezing_range_k"].low
-    thawed, frozen = (CONSTANTS[f"organic_conductivity_{state}"].low for state in ("thawed", "frozen"))
-    middle = 0.5 * (modelled["ground_temperature_c"] + modelled["surface_soil_temperature_c"])
-    conductivity = thawed + (frozen - thawed) * (-middle / freezing).clip(0.0, 1.0)
-    heat = modelled["ground_heat_mj_m2"] / MJ_PER_DAY
-    above = modelled["organic_layer_m"] - depth
-    return modelled["soil_top_temperature_c"] + heat * above / conductivity
+    """Modelled temperature [degC] at a depth [m] in the organic layer: straight lines between its surface, its middle
+    and the top of the mineral soil."""
+    whole = modelled["organic_layer_m"]
+    upper, middle, lower = (modelled[f"{node}_temperature_c"] for node in ("ground", "organic", "soil_top"))
+    share = 2.0 * depth / whole
+    above = upper + (middle - upper) * share.clip(0.0, 1.0)
+    return above.where(share <= 1.0, middle + (lower - middle) * (share - 1.0).clip(0.0, 1.0))
 
 
 def report(repeats: int) -> Part:

@@ -1,0 +1,138 @@
+"""The organic layer: moss, litter and humus on the mineral soil, a node with heat, water and ice of its own.
+
+Rain and melt wet it first; what it cannot hold drains into the bucket of `sim.water`. Its water freezes by enthalpy,
+which is 0 at 0 degC and thawed, as the soil's. So melt that seeps into a frozen layer and freezes there warms it by its
+heat of fusion; rain brings the air's warmth, and water that drains or evaporates takes the layer's along.
+"""
+
+from sim.jit import compiled
+from sim.physical_constants import (
+    ICE_HEAT_CAPACITY,
+    LATENT_HEAT_FUSION,
+    WATER_DENSITY,
+    WATER_HEAT_CAPACITY,
+)
+from sim.soil import conductivity, frozen_share, temperature, where_it_freezes
+
+LEAST_DEPTH_M = 0.01  # of litter, where neither moss nor humus is
+
+
+@compiled
+def organic_thickness(b, i) -> float:
+    """Thickness of a lane's organic layer [m]."""
+    return max(b.s.organic_depth[i] * b.p.moss[i], LEAST_DEPTH_M)
+
+
+@compiled
+def layer_capacities(freezes, depth, dry, water):
+    """Heat capacities thawed and frozen [J m-2 K-1] and latent heat [J m-2] of a layer.
+
+    freezes : 1, or 0 where freezing is switched off; depth [m]; dry : heat capacity without water [J m-3 K-1];
+    water : [mm].
+    """
+    thawed = dry * depth + WATER_HEAT_CAPACITY * water
+    frozen = where_it_freezes(freezes, thawed, dry * depth + ICE_HEAT_CAPACITY * water)
+    return thawed, frozen, freezes * LATENT_HEAT_FUSION * water
+
+
+@compiled
+def wet_conductivity(water, pores, dry, saturated) -> float:
+    """Conductivity [W m-1 K-1] of organic soil: a straight line from dry to saturated (Farouki 1981; CLM, Lawrence and
+    Slater 2008). water, pores : [mm]."""
+    return dry + (saturated - dry) * min(water / pores, 1.0)
+
+
+@compiled
+def organic_growth(depth, conifer, deciduous, depth_conifer, depth_deciduous, depth_open, growth, loss_years) -> float:
+    """Depth of the organic layer [m] a year later, toward the equilibrium of the canopy above it."""
+    equilibrium = conifer * depth_conifer + deciduous * depth_deciduous + (1.0 - conifer - deciduous) * depth_open
+    gap = equilibrium - depth
+    return depth + (min(gap, growth) if gap > 0.0 else gap / loss_years)
+
+
+@compiled
+def renew_organic_layer(b, i):
+    """A year of growth or loss of the organic layer, which comes and goes dry and at 0 degC."""
+    s, p, w = b.s, b.p, b.w
+    s.organic_depth[i] = organic_growth(
+        s.organic_depth[i],
+        w.cover_conifer[i],
+        w.cover_deciduous[i],
+        p.organic_depth_conifer_m[i],
+        p.organic_depth_deciduous_m[i],
+        p.organic_depth_open_m[i],
+        p.organic_growth_m_yr[i],
+        p.organic_loss_years[i],
+    )
+
+
+@compiled
+def organic_capacities(b, i):
+    """`layer_capacities` of a lane, with the water that it has now."""
+    p = b.p
+    return layer_capacities(
+        p.soil_freezing[i], organic_thickness(b, i), p.organic_heat_capacity_dry[i], b.s.organic_water[i]
+    )
+
+
+@compiled
+def organic_temperature(b, i) -> float:
+    """Temperature of a lane's organic layer now [degC]."""
+    thawed, frozen, latent = organic_capacities(b, i)
+    return temperature(b.s.organic_heat[i], thawed, frozen, latent, b.p.soil_freezing_range_k[i])
+
+
+@compiled
+def organic_conductivity(b, i, celsius) -> float:
+    """Conductivity of a lane's organic layer at a temperature [W m-1 K-1]."""
+    p = b.p
+    water, pores = b.s.organic_water[i], WATER_DENSITY * p.organic_porosity[i] * organic_thickness(b, i)
+    dry = p.organic_conductivity_dry[i]
+    thawed = wet_conductivity(water, pores, dry, p.organic_conductivity_saturated[i])
+    frozen = wet_conductivity(water, pores, dry, p.organic_conductivity_saturated_frozen[i])
+    ice = frozen_share(celsius, p.soil_freezing_range_k[i])
+    return conductivity(ice, thawed, where_it_freezes(p.soil_freezing[i], thawed, frozen))
+
+
+@compiled
+def liquid_water(b, i) -> float:
+    """Water of a lane's organic layer that is not ice [mm], at the start of the step."""
+    p = b.p
+    ice = p.soil_freezing[i] * frozen_share(b.w.organic[i], p.soil_freezing_range_k[i])
+    return b.s.organic_water[i] * (1.0 - ice)
+
+
+@compiled
+def wetness(b, i) -> float:
+    """Liquid water of a lane's organic layer, as a share of what it holds against drainage, at most 1."""
+    held = WATER_DENSITY * b.p.organic_water_held[i] * organic_thickness(b, i)
+    return min(liquid_water(b, i) / held, 1.0)
+
+
+@compiled
+def drained(water, frozen, held, pores) -> float:
+    """Water that drains [mm]: what is liquid of all beyond what the layer holds, and all beyond its pores."""
+    return max(min(max(water - held, 0.0), water * (1.0 - frozen)), water - pores)
+
+
+@compiled
+def wet_organic_layer(b, i, rain, melted, evaporated):
+    """Let rain and melt into a lane's organic layer, and evaporation and drainage out of it, each with its heat.
+
+    Amounts in mm. Returns what drains, and the heat that water brought, less what it took along [J m-2].
+    """
+    s, p, w = b.s, b.p, b.w
+    depth = organic_thickness(b, i)
+    before = max(w.organic[i], 0.0)
+    brought = WATER_HEAT_CAPACITY * (max(w.air[i], 0.0) * rain - before * evaporated)
+    water = max(s.organic_water[i] + (rain + melted - evaporated), 0.0)
+    s.organic_water[i] = water
+    s.organic_heat[i] += brought
+    now = organic_temperature(b, i)
+    ice = p.soil_freezing[i] * frozen_share(now, p.soil_freezing_range_k[i])
+    held, pores = WATER_DENSITY * p.organic_water_held[i] * depth, WATER_DENSITY * p.organic_porosity[i] * depth
+    away = drained(water, ice, held, pores)
+    taken = WATER_HEAT_CAPACITY * max(now, 0.0) * away
+    s.organic_water[i] = water - away
+    s.organic_heat[i] -= taken
+    return away, brought - taken
