@@ -79,7 +79,7 @@ def total_sensible(heat) -> float:
 @compiled
 def total_vapour(b, i, vapour) -> float:
     """All vapour of a step [mm], of a `sim.fluxes.Vapour` and of the canopy's snow."""
-    return vapour.leaves + vapour.wet_canopy + vapour.snow + vapour.moss + b.w.canopy_sublimation[i]
+    return vapour.leaves + vapour.wet_canopy + vapour.snow + vapour.floor + b.w.canopy_sublimation[i]
 
 
 @compiled
@@ -96,7 +96,7 @@ def add_step(b, i, net_radiation, heat, vapour, excess, advected, seconds):
     r.snowfall_mm[i] += w.snow[i]
     r.evapotranspiration_mm[i] += all_vapour
     r.transpiration_mm[i] += vapour.leaves
-    r.floor_evaporation_mm[i] += vapour.moss
+    r.floor_evaporation_mm[i] += vapour.floor
     r.sublimation_mm[i] += sublimated
     r.canopy_sublimation_mm[i] += w.canopy_sublimation[i]
     r.runoff_mm[i] += excess

@@ -3,8 +3,8 @@
 import math
 
 from sim.jit import compiled
-from sim.organic import organic_thickness, wet_conductivity
-from sim.physical_constants import LATENT_HEAT_FUSION, WATER_DENSITY
+from sim.organic import organic_conductivities, organic_thickness
+from sim.physical_constants import LATENT_HEAT_FUSION
 from sim.soil import boundary_temperature, where_it_freezes
 
 
@@ -58,12 +58,12 @@ def active_layer(b, i) -> float:
     p, w, r = b.p, b.w, b.r
     depth = organic_thickness(b, i)
     water = w.thaw_water[i] / w.thaw_seconds[i] if w.thaw_seconds[i] > 0.0 else 0.0
-    pores = WATER_DENSITY * p.organic_porosity[i] * depth
+    moss, humus = organic_conductivities(b, i, water, 0.0)
     thawed = p.soil_heat_capacity_thawed[i]
     return thaw_depth(
         depth,
         p.soil_freezing[i] * LATENT_HEAT_FUSION * water,
-        wet_conductivity(water, pores, p.organic_conductivity_dry[i], p.organic_conductivity_saturated[i]),
+        2.0 * moss * humus / (moss + humus),
         w.thaw_warmth[i],
         w.thaw_seconds[i],
         r.deep_soil_temperature_c[i],

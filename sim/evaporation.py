@@ -10,6 +10,7 @@ from sim.physical_constants import (
     PSYCHROMETRIC_PER_HPA,
     VAPOUR_RATIO,
 )
+from sim.water import left_by_leaves
 from sim.weather import SATURATION_AT_FREEZING_HPA, saturation_pressure, saturation_slope
 
 
@@ -59,9 +60,14 @@ def ground_vapour(b, seconds):
         exchange = max(w.ground_exchange[i], p.minimum_conductance[i] / (w.air_density[i] * AIR_HEAT_CAPACITY))
         moss = moss_conductance(exchange, wetness(b, i), p.moss_resistance[i]) if s.ground[i] > 0.0 else 0.0
         conductance = w.ground_exchange[i] if snow else moss
+        # Roots of the understorey and capillary rise tie the layer to the soil below it: both give, by what they have.
+        layer = liquid_water(b, i)
+        soil = left_by_leaves(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds)
+        w.floor_water[i] = layer + soil
+        w.layer_share[i] = layer / (layer + soil) if layer > 0.0 else 0.0
         # No more vapour is exchanged within the step than there is water, by snow at 0 degC: the limit is on the
         # conductance, so that the ground's equation and what is moved agree.
-        store = s.swe[i] if snow else liquid_water(b, i)
+        store = s.swe[i] if snow else w.floor_water[i]
         drying = max(abs((SATURATION_AT_FREEZING_HPA if snow else saturated) - w.humidity[i]), 1e-3)
         transfer = min(w.vapour_density[i] * conductance, store / (seconds * drying))
         heat = LATENT_HEAT_SUBLIMATION if snow else LATENT_HEAT_VAPORISATION

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from sim.account import add_step, total_sensible, total_vapour
 from sim.jit import compiled
-from sim.organic import liquid_water, wet_organic_layer
+from sim.organic import wet_organic_layer
 from sim.photosynthesis import energy_of_photosynthesis
 from sim.physical_constants import (
     FREEZING_POINT_K,
@@ -43,7 +43,7 @@ class Vapour(NamedTuple):
     leaves: float
     wet_canopy: float
     snow: float
-    moss: float
+    floor: float
 
 
 @compiled
@@ -56,8 +56,9 @@ def move_heat_and_water(b, seconds):
         vapour = evaporate(b, i, seconds)
         melted, carried = warm_ground(b, i, ground_longwave, heat, vapour, seconds)
         warm_soil_and_trunk(b, i, heat, seconds)
-        drained, carried_by_water = wet_organic_layer(b, i, w.infiltration[i], melted, vapour.moss)
-        excess = fill_soil(b, i, vapour, drained)
+        from_layer = w.layer_share[i] * vapour.floor
+        drained, carried_by_water = wet_organic_layer(b, i, w.infiltration[i], melted, from_layer)
+        excess = fill_soil(b, i, vapour, drained - (vapour.floor - from_layer))
         advected = w.advected[i] - carried + carried_by_water
         cross_boundary(b, i, net_radiation, heat, vapour, excess, advected, seconds)
         add_step(b, i, net_radiation, heat, vapour, excess, advected, seconds)
@@ -103,7 +104,7 @@ def conduct(b, i):
 
 @compiled
 def evaporate(b, i, seconds):
-    """Water that leaves the leaves, the wet canopy, and the snow or else the moss."""
+    """Water that leaves the leaves, the wet canopy, and the snow or else the floor of moss and understorey."""
     s, w = b.s, b.w
     to_vapour = seconds / LATENT_HEAT_VAPORISATION  # mm per W m-2
     available = max(w.net[i] - w.fixed[i], 0.0)
@@ -114,7 +115,7 @@ def evaporate(b, i, seconds):
         w.dry_coefficient[i] * available * to_vapour,
         min(w.wet_coefficient[i] * available, w.wet_limit[i]) * to_vapour,
         min(latent * (seconds / LATENT_HEAT_SUBLIMATION), s.swe[i]) if snow else 0.0,
-        0.0 if snow else min(latent * to_vapour, liquid_water(b, i)),
+        0.0 if snow else min(latent * to_vapour, w.floor_water[i]),
     )
 
 
@@ -125,7 +126,7 @@ def warm_ground(b, i, longwave, heat, vapour, seconds):
     [J m-2]."""
     s, p, w = b.s, b.p, b.w
     snow = s.swe[i] > 0.0
-    latent = (LATENT_HEAT_SUBLIMATION * vapour.snow + LATENT_HEAT_VAPORISATION * vapour.moss) * (1.0 / seconds)
+    latent = (LATENT_HEAT_SUBLIMATION * vapour.snow + LATENT_HEAT_VAPORISATION * vapour.floor) * (1.0 / seconds)
     carried = ICE_HEAT_CAPACITY * vapour.snow * s.ground[i]
     enthalpy = ground_capacity(s.swe[i], p.skin_heat_capacity[i]) * s.ground[i] - carried
     enthalpy += seconds * (
@@ -150,11 +151,11 @@ def warm_soil_and_trunk(b, i, heat, seconds):
 
 
 @compiled
-def fill_soil(b, i, vapour, drained) -> float:
-    """Water of canopy and soil, after what drained to it; returns what the bucket cannot hold, which runs off."""
+def fill_soil(b, i, vapour, gained) -> float:
+    """Water of canopy and soil, with what the soil gained from above; returns what the bucket cannot hold."""
     s = b.s
     s.canopy_rain[i] = max(s.canopy_rain[i] - vapour.wet_canopy, 0.0)
-    water = s.soil_water[i] + drained - vapour.leaves
+    water = s.soil_water[i] + gained - vapour.leaves
     excess = runoff(water, b.p.max_water_content_mm[i])
     s.soil_water[i] = water - excess
     return excess

@@ -1,7 +1,7 @@
 """Temperatures and conductances down the ground: snow, organic layer, two soil nodes, boundary."""
 
 from sim.jit import compiled
-from sim.organic import organic_conductivity, organic_temperature, organic_thickness
+from sim.organic import organic_conductivities, organic_temperature, organic_thickness
 from sim.soil import boundary_temperature, conductivity, frozen_share, in_series, soil_temperatures
 
 
@@ -24,9 +24,9 @@ def ground_conductances(b, i):
     deep = conductivity(frozen_share(w.deep[i], span), thawed, frozen)
     below = conductivity(frozen_share(0.5 * (w.deep[i] + boundary_temperature(b, i)), span), thawed, frozen)
     half = 0.5 * organic_thickness(b, i)
-    organic = organic_conductivity(b, i, w.organic[i])
+    moss, humus = organic_conductivities(b, i, s.organic_water[i], frozen_share(w.organic[i], span))
     w.upper_soil[i] = w.half_surface[i] / upper
-    w.organic_conductance[i] = in_series(s.swe[i] * w.snow_resistance[i], 1.0, half, organic)
-    w.surface_conductance[i] = in_series(half, organic, w.half_surface[i], upper)
+    w.organic_conductance[i] = in_series(s.swe[i] * w.snow_resistance[i], 1.0, half, moss)
+    w.surface_conductance[i] = in_series(half, humus, w.half_surface[i], upper)
     w.deep_conductance[i] = in_series(w.half_surface[i], lower, w.above_deep_node[i], deep)
     w.boundary_conductance[i] = below * w.per_below_deep_node[i]

@@ -36,10 +36,10 @@ def layer_capacities(freezes, depth, dry, water):
 
 
 @compiled
-def wet_conductivity(water, pores, dry, saturated) -> float:
+def wet_conductivity(filled, dry, saturated) -> float:
     """Conductivity [W m-1 K-1] of organic soil: a straight line from dry to saturated (Farouki 1981; CLM, Lawrence and
-    Slater 2008). water, pores : [mm]."""
-    return dry + (saturated - dry) * min(water / pores, 1.0)
+    Slater 2008). filled : share of the pores."""
+    return dry + (saturated - dry) * min(filled, 1.0)
 
 
 @compiled
@@ -83,15 +83,27 @@ def organic_temperature(b, i) -> float:
 
 
 @compiled
-def organic_conductivity(b, i, celsius) -> float:
-    """Conductivity of a lane's organic layer at a temperature [W m-1 K-1]."""
+def organic_conductivities(b, i, water, ice):
+    """Conductivities of the moss above and the humus below [W m-1 K-1], which share the water as they hold it.
+
+    water : of the whole layer [mm]; ice : share of it.
+    """
     p = b.p
-    water, pores = b.s.organic_water[i], WATER_DENSITY * p.organic_porosity[i] * organic_thickness(b, i)
-    dry = p.organic_conductivity_dry[i]
-    thawed = wet_conductivity(water, pores, dry, p.organic_conductivity_saturated[i])
-    frozen = wet_conductivity(water, pores, dry, p.organic_conductivity_saturated_frozen[i])
-    ice = frozen_share(celsius, p.soil_freezing_range_k[i])
-    return conductivity(ice, thawed, where_it_freezes(p.soil_freezing[i], thawed, frozen))
+    # Twice their shares of the water, since each has half of the pores.
+    in_humus = 2.0 * p.humus_water_held[i] / (p.moss_water_held[i] + p.humus_water_held[i])
+    filled = water / (WATER_DENSITY * p.organic_porosity[i] * organic_thickness(b, i))
+    dry, thawed = p.organic_conductivity_dry[i], p.organic_conductivity_saturated[i]
+    frozen = where_it_freezes(p.soil_freezing[i], thawed, p.organic_conductivity_saturated_frozen[i])
+    saturated = conductivity(ice, thawed, frozen)
+    return wet_conductivity((2.0 - in_humus) * filled, dry, saturated), wet_conductivity(
+        in_humus * filled, dry, saturated
+    )
+
+
+@compiled
+def water_held(b, i) -> float:
+    """Water that a lane's organic layer holds against drainage [mm]: half of it is moss, half humus."""
+    return 0.5 * WATER_DENSITY * (b.p.moss_water_held[i] + b.p.humus_water_held[i]) * organic_thickness(b, i)
 
 
 @compiled
@@ -105,8 +117,7 @@ def liquid_water(b, i) -> float:
 @compiled
 def wetness(b, i) -> float:
     """Liquid water of a lane's organic layer, as a share of what it holds against drainage, at most 1."""
-    held = WATER_DENSITY * b.p.organic_water_held[i] * organic_thickness(b, i)
-    return min(liquid_water(b, i) / held, 1.0)
+    return min(liquid_water(b, i) / water_held(b, i), 1.0)
 
 
 @compiled
@@ -122,7 +133,6 @@ def wet_organic_layer(b, i, rain, melted, evaporated):
     Amounts in mm. Returns what drains, and the heat that water brought, less what it took along [J m-2].
     """
     s, p, w = b.s, b.p, b.w
-    depth = organic_thickness(b, i)
     before = max(w.organic[i], 0.0)
     brought = WATER_HEAT_CAPACITY * (max(w.air[i], 0.0) * rain - before * evaporated)
     water = max(s.organic_water[i] + (rain + melted - evaporated), 0.0)
@@ -130,8 +140,7 @@ def wet_organic_layer(b, i, rain, melted, evaporated):
     s.organic_heat[i] += brought
     now = organic_temperature(b, i)
     ice = p.soil_freezing[i] * frozen_share(now, p.soil_freezing_range_k[i])
-    held, pores = WATER_DENSITY * p.organic_water_held[i] * depth, WATER_DENSITY * p.organic_porosity[i] * depth
-    away = drained(water, ice, held, pores)
+    away = drained(water, ice, water_held(b, i), WATER_DENSITY * p.organic_porosity[i] * organic_thickness(b, i))
     taken = WATER_HEAT_CAPACITY * max(now, 0.0) * away
     s.organic_water[i] = water - away
     s.organic_heat[i] -= taken

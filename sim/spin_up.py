@@ -107,7 +107,7 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         + (1.0 - crowns) * parameters["organic_depth_open_m"]
     )
     depth = stocks.get("organic_layer_m", depth)
-    organic_water = 0.8 * WATER_DENSITY * parameters["organic_water_held"] * depth
+    organic_water = 0.4 * WATER_DENSITY * (parameters["moss_water_held"] + parameters["humus_water_held"]) * depth
     mean = parameters["mean_annual_temperature_c"]
     boundary = parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K
     winter = mean - parameters["seasonal_amplitude_c"]

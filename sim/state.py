@@ -188,7 +188,8 @@ surface_sum surface_thawed temperature_stress_conifer temperature_stress_deciduo
 top_of_canopy top_sum transpiration_conifer transpiration_deciduous trial trunk_air trunk_base trunk_by_canopy
 trunk_by_ground trunk_canopy trunk_ground unloading_rate upper_soil vapour vapour_density water_before water_gain
 water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
-organic organic_base organic_by_ground organic_conductance organic_sum surface_by_organic thaw_water
+floor_water layer_share organic organic_base organic_by_ground organic_conductance organic_sum surface_by_organic
+thaw_water
 """.split()
 
 

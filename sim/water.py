@@ -15,6 +15,12 @@ def water_stress(water, capacity, threshold, seconds) -> float:
 
 
 @compiled
+def left_by_leaves(water, capacity, threshold, seconds) -> float:
+    """Water [mm] that leaves cannot take within the step, by `water_stress`."""
+    return water * (threshold * capacity) / (threshold * capacity + LARGEST_EVAPORATION * seconds)
+
+
+@compiled
 def runoff(water, capacity) -> float:
     """Water beyond capacity [mm]."""
     return max(water - capacity, 0.0)
