@@ -28,6 +28,7 @@ FUSION = 3.34e5  # J kg-1
 VAPORISATION = 2.5e6  # J kg-1
 SUBLIMATION = FUSION + VAPORISATION
 WATER_DENSITY = 1000.0  # kg m-3
+WATER_HEAT = 4180.0  # J kg-1 K-1
 YEAR_S = 365.0 * 86400.0
 
 SPECIES = ("conifer", "deciduous")
@@ -286,9 +287,14 @@ def structure(p, s, day):
 
 
 def prepare_day(p, s, day, weather):
-    """What holds for the day: weather, structure, density of the air, and whether snow lies in the morning."""
+    """What holds for the day: weather, structure, density of the air, and the snow that lies in the morning."""
     return SimpleNamespace(
-        number=day, weather=weather, stand=structure(p, s, day), air_density=air_density(p, weather.mean), snow=s.swe
+        number=day,
+        weather=weather,
+        stand=structure(p, s, day),
+        air_density=air_density(p, weather.mean),
+        snow=s.swe,
+        snow_density=s.snow_density,
     )
 
 
@@ -360,13 +366,29 @@ def canopy_exchange(p, air, today, cover):
     return max(today.air_density * AIR_HEAT * velocity, p.minimum_conductance) * max(cover, 1e-3)
 
 
+def ground_roughness(p, s, today):
+    """m."""
+    snow = today.snow if today.weather.rows is None else s.swe
+    return min(p.snow_roughness_m, p.soil_roughness_m) if snow > 1.0 else p.soil_roughness_m
+
+
+def wind_below_canopy(p, air, today):
+    """m s-1, were it at the height of the wind."""
+    return air.wind * (1.0 - p.wind_reduction * today.stand.cover)
+
+
+def floor_wind(p, s, air, today):
+    """m s-1, near the ground."""
+    roughness = ground_roughness(p, s, today)
+    share = math.log(p.ground_reference_height_m / roughness) / math.log(p.canopy_reference_height_m / roughness)
+    return wind_below_canopy(p, air, today) * share
+
+
 def ground_exchange(p, s, air, today, ground):
     """h_g before its floor [W m-2 K-1]. `ground` : temperature with the fresh snow mixed in."""
-    snow = today.snow if today.weather.rows is None else s.swe
-    roughness = min(p.snow_roughness_m, p.soil_roughness_m) if snow > 1.0 else p.soil_roughness_m
-    wind = air.wind * (1.0 - p.wind_reduction * today.stand.cover)
+    roughness = ground_roughness(p, s, today)
     aloft, height = p.canopy_reference_height_m, p.ground_reference_height_m
-    low_wind = wind * math.log(height / roughness) / math.log(aloft / roughness)
+    wind, low_wind = wind_below_canopy(p, air, today), floor_wind(p, s, air, today)
     richardson = GRAVITY * height * (air.celsius - ground) / ((air.celsius + FREEZING_K) * max(low_wind**2, 1e-6))
     if richardson > 0.0:
         stability = 1.0 / (1.0 + p.stability_factor * richardson)
@@ -415,17 +437,22 @@ def evaporation_coefficients(p, s, air, today, rays, wet, seconds):
     return dry / both, wetted / both
 
 
-def bare_ground_latent_heat(p, s, air, rays, ground, seconds):
-    """Of snow-free ground [W m-2], from its net radiation under a canopy as warm as the air."""
-    if air.celsius <= 0.0 or ground <= 0.0:
+def water_left_by_leaves(p, s, seconds):
+    """Water of the bucket that the floor can have [mm]."""
+    dry = p.water_stress_threshold * p.max_water_content_mm
+    return s.soil_water * dry / (dry + 4e-4 * seconds)
+
+
+def floor_conductance(p, air, today, exchange, wetness, water, ground, seconds):
+    """For vapour, of the thawed moss floor [mm s-1 hPa-1], at most such that its water lasts the step."""
+    if ground <= 0.0 or wetness <= 0.0:
         return 0.0
-    down = longwave_down(air.longwave, rays.cover, air.celsius)
-    available = rays.ground + p.ground_emissivity * (down - black_body(ground))
-    share = min(equilibrium(air) * p.priestley_taylor_ground * water_stress(p, s, seconds), 1.0)
-    return share * max(available, 0.0)
+    resistance = today.air_density * AIR_HEAT / exchange + p.moss_resistance / wetness**2
+    conductance = today.air_density * VAPOUR_RATIO / p.air_pressure_hpa / resistance
+    return min(conductance, water / (seconds * max(abs(saturation_pressure(ground) - air.vapour), 1e-3)))
 
 
-def vapour_conductance(p, air, exchange, snow, seconds):
+def snow_conductance(p, air, exchange, snow, seconds):
     """Of the snow's surface [mm s-1 hPa-1], at most such that snow at 0 degC lasts the step."""
     conductance = VAPOUR_RATIO / p.air_pressure_hpa * exchange / AIR_HEAT
     return min(conductance, snow / (seconds * max(abs(6.1121 - air.vapour), 1e-3)))
@@ -501,9 +528,30 @@ def canopy_rain(p, s, air, today, cover, melted):
     return held, (held / capacity if capacity > 0.0 else 0.0), s.canopy_rain + air.rain + melted - held
 
 
-def snow_density(p, stand):
+def fresh_snow_density(p, air, wind):
     """kg m-3."""
-    return p.snow_density_open + stand.cover * (p.snow_density_sheltered - p.snow_density_open)
+    density = p.snow_density_fresh + p.snow_density_fresh_per_c * air.celsius
+    return max(density + p.snow_density_fresh_by_wind * math.sqrt(wind), p.snow_density_least)
+
+
+def snow_density(s, fallen, fresh):
+    """Of the pack with the snow that fell on it [kg m-3]: mass over depth."""
+    depth = s.swe / s.snow_density + fallen / fresh
+    return (s.swe + fallen) / depth if depth > 0.0 else s.snow_density
+
+
+def settled_density(p, s, day_mean, organic):
+    """The pack's density [kg m-3] after a day, whose surface was so warm in the mean [degC]."""
+    frost = max(-(day_mean + organic) / 2.0, 0.0)
+    viscosity = p.snow_viscosity * math.exp(
+        p.snow_viscosity_by_cold * frost + p.snow_viscosity_by_density * s.snow_density
+    )
+    too_dense = max(s.snow_density - p.snow_metamorphism_density, 0.0)
+    metamorphism = p.snow_metamorphism * math.exp(
+        -p.snow_metamorphism_by_cold * frost - p.snow_metamorphism_by_density * too_dense
+    )
+    gain = 86400.0 * (GRAVITY * s.swe / 2.0 / viscosity + metamorphism)
+    return min(s.snow_density + gain * s.snow_density, p.snow_density_largest)
 
 
 def snow_conductivity(density):
@@ -581,20 +629,48 @@ def soil_conductivity(p, celsius):
     return p.soil_conductivity * (1.0 + (ratio - 1.0) * frozen_share(p, celsius))
 
 
-def organic_resistance(p, s, ground, surface):
-    """Of moss and organic layer [m2 K W-1]."""
-    thawed, frozen = p.organic_conductivity_thawed, p.organic_conductivity_frozen
-    return p.moss * s.organic_depth / (thawed + (frozen - thawed) * frozen_share(p, 0.5 * (ground + surface)))
+def organic_thickness(p, s):
+    """m, litter at the least."""
+    return max(p.moss * s.organic_depth, 0.01)
 
 
-def ground_conductances(p, s, nodes, ground, surface, deep, snow, density):
-    """g_g1, g_12, g_2b [W m-2 K-1]."""
+def organic_node(p, s, water):
+    """The organic layer with so much water [mm]."""
+    z = organic_thickness(p, s)
+    dry = z * p.organic_heat_capacity_dry
+    thawed = dry + WATER_HEAT * water
+    frozen = dry + ICE_HEAT * water if p.soil_freezing else thawed
+    return SoilNode(z, thawed, frozen, FUSION * water if p.soil_freezing else 0.0, p.soil_freezing_range_k)
+
+
+def organic_water_held(p, s):
+    """Against drainage [mm], by moss and by humus."""
+    half = WATER_DENSITY * organic_thickness(p, s) / 2.0
+    return half * p.moss_water_held, half * p.humus_water_held
+
+
+def organic_resistances(p, s, celsius):
+    """Of the moss and of the humus below it [m2 K W-1]."""
+    held = organic_water_held(p, s)
+    half = organic_thickness(p, s) / 2.0
+    for mine in held:
+        filled = min(s.organic_water * mine / sum(held) / (WATER_DENSITY * p.organic_porosity * half), 1.0)
+        frozen = p.organic_conductivity_saturated_frozen if p.soil_freezing else p.organic_conductivity_saturated
+        ice = frozen_share(p, celsius)
+        wet = p.organic_conductivity_saturated * (1.0 - ice) + frozen * ice
+        yield half / (p.organic_conductivity_dry * (1.0 - filled) + wet * filled)
+
+
+def ground_conductances(p, s, nodes, organic, surface, deep, snow, density):
+    """g_go, g_o1, g_12, g_2b [W m-2 K-1]."""
     half = nodes[0].thickness / 2.0
+    moss, humus = organic_resistances(p, s, organic)
     boundary = p.deep_boundary_temperature_k - FREEZING_K
     to_deep = (p.deep_soil_node_m - p.surface_soil_depth_m) / soil_conductivity(p, deep)
     snow_resistance = snow / density / snow_conductivity(density)
     return (
-        1.0 / (snow_resistance + organic_resistance(p, s, ground, surface) + half / soil_conductivity(p, ground)),
+        1.0 / (snow_resistance + moss),
+        1.0 / (humus + half / soil_conductivity(p, organic)),
         1.0 / (half / soil_conductivity(p, surface) + to_deep),
         soil_conductivity(p, 0.5 * (deep + boundary)) / (p.boundary_depth_m - p.deep_soil_node_m),
     )
@@ -604,7 +680,7 @@ def ground_conductances(p, s, nodes, ground, surface, deep, snow, density):
 
 
 class EnergyBalance:
-    """The five balances as functions of the temperatures [degC] at the end of the step.
+    """The six balances as functions of the temperatures [degC] at the end of the step.
 
     Its fields are what is known before: forcing, conductances, heat capacities, temperatures at the start.
     """
@@ -632,32 +708,34 @@ class EnergyBalance:
         rest = net - sensible - dry - wet - self.growth - self.canopy_snow - self.g_ct * (canopy - trunk)
         return net, sensible, dry, wet, rest
 
-    def snow_vapour(self, ground):
-        """Vapour that leaves the snow [mm s-1], linear in the temperature of the ice."""
-        ice = min(self.ground_start, 0.0)
-        pressure = saturation_pressure(ice) + saturation_slope(ice) * (min(ground, 0.0) - ice)
-        return self.vapour_conductance * (pressure - self.vapour) if self.snow > 0.0 else 0.0
+    def ground_vapour(self, ground):
+        """Vapour that leaves snow or floor [mm s-1], linear in the temperature of the ice or of the moss."""
+        warmest = 0.0 if self.snow > 0.0 else math.inf
+        start = min(self.ground_start, warmest)
+        pressure = saturation_pressure(start) + saturation_slope(start) * (min(ground, warmest) - start)
+        return self.vapour_conductance * (pressure - self.vapour)
 
     def ground(self, canopy, ground):
         """Net radiation, sensible and latent heat [W m-2]."""
         net = self.ground_shortwave
         net += self.emissivity * (longwave_down(self.sky, self.cover, canopy) - self.ground_emission(ground))
-        latent = SUBLIMATION * self.snow_vapour(ground) if self.snow > 0.0 else self.bare_latent
+        latent = (SUBLIMATION if self.snow > 0.0 else VAPORISATION) * self.ground_vapour(ground)
         return net, self.h_ground * (ground - self.air), latent
 
-    def gains(self, canopy, trunk, ground, surface, deep):
-        """Heat gained by trunk, ground (what melts snow included), surface and deep soil [W m-2]."""
+    def gains(self, canopy, trunk, ground, organic, surface, deep):
+        """Heat gained by trunk, ground (what melts snow included), organic layer, surface and deep soil [W m-2]."""
         net, sensible, latent = self.ground(canopy, ground)
         down_trunk = self.g_tg * (trunk - ground)
         return (
             self.g_ct * (canopy - trunk) - self.h_trunk * (trunk - self.air) - down_trunk,
-            net - sensible - latent + down_trunk - self.g_g1 * (ground - surface),
-            self.g_g1 * (ground - surface) - self.g_12 * (surface - deep),
+            net - sensible - latent + down_trunk - self.g_go * (ground - organic),
+            self.g_go * (ground - organic) - self.g_o1 * (organic - surface),
+            self.g_o1 * (organic - surface) - self.g_12 * (surface - deep),
             self.g_12 * (surface - deep) - self.g_2b * (deep - self.boundary),
         )
 
     def below(self, canopy):
-        """Temperatures of trunk, ground, surface and deep soil under a canopy of this temperature.
+        """Temperatures of trunk, ground, organic layer, surface and deep soil under a canopy of this temperature.
 
         The ground is below 0 degC, at 0 degC while snow melts, or above it once all that has not sublimated melted.
         """
@@ -665,42 +743,43 @@ class EnergyBalance:
             cold = self._solve(canopy, -1.0, lambda ground: (ground, (self.skin + ICE_HEAT * self.snow) * ground))
             if cold[1] <= 0.0:
                 return cold
-            meltable = self.snow - self.seconds * self.snow_vapour(0.0)
-            trunk, melt, surface, deep = self._solve(canopy, 0.0, lambda melt: (0.0, FUSION * melt))
+            meltable = self.snow - self.seconds * self.ground_vapour(0.0)
+            trunk, melt, *below = self._solve(canopy, 0.0, lambda melt: (0.0, FUSION * melt))
             if melt <= meltable:
-                return trunk, 0.0, surface, deep
+                return trunk, 0.0, *below
         else:
             meltable = 0.0
         return self._solve(canopy, 0.0, lambda ground: (ground, self.skin * ground + FUSION * meltable))
 
     def _solve(self, canopy, guess, ground_of):
-        """Dense solution of the four balances, linear in trunk, one unknown of the ground, surface and deep soil.
+        """Dense solution of the five balances, linear in trunk, one unknown of the ground, and the nodes below it.
 
         ground_of : unknown -> temperature of the ground, and its heat [J m-2] with that of the snow it has melted.
         """
 
-        def imbalance(trunk, unknown, surface, deep):
+        def imbalance(trunk, unknown, organic, surface, deep):
             ground, heat = ground_of(unknown)
             stored = (
                 self.trunk_capacity * (trunk - self.trunk_start),
                 heat - self.ground_heat,
+                self.organic_capacity * (organic - self.organic_start),
                 self.surface_capacity * (surface - self.surface_start),
                 self.deep_capacity * (deep - self.deep_start),
             )
-            gains = self.gains(canopy, trunk, ground, surface, deep)
+            gains = self.gains(canopy, trunk, ground, organic, surface, deep)
             return [gain - heat / self.seconds for gain, heat in zip(gains, stored, strict=True)]
 
-        start = np.array([self.trunk_start, guess, self.surface_start, self.deep_start])
-        values = np.array([imbalance(*point) for point in (start, *(start + np.eye(4)))])
+        start = np.array([self.trunk_start, guess, self.organic_start, self.surface_start, self.deep_start])
+        values = np.array([imbalance(*point) for point in (start, *(start + np.eye(5)))])
         return start - np.linalg.solve((values[1:] - values[0]).T, values[0])
 
     def rest(self, canopy):
         """What the canopy has left over at this temperature [W m-2], all below it in balance; falls with it."""
-        trunk, ground, _, _ = self.below(canopy)
+        trunk, ground, *_ = self.below(canopy)
         return self.canopy(canopy, trunk, ground)[-1]
 
     def solve(self):
-        """Temperatures of canopy, trunk, ground, surface and deep soil; the canopy's by false position (Illinois)."""
+        """Temperatures of canopy, trunk, ground, organic layer and soil; the canopy's by false position (Illinois)."""
         low, high = self.air - 150.0, self.air + 150.0
         at_low, at_high = self.rest(low), self.rest(high)
         if at_low == at_high:  # no trees, no wind
@@ -764,8 +843,7 @@ def take_step(p, s, today, step, steps_per_day):
     seconds = 86400.0 / steps_per_day
     stand = today.stand
     air = air_of_step(p, today, step, steps_per_day)
-    density = snow_density(p, stand)
-    rays = shortwave(p, air, today.weather.diffuse, stand, surface_albedo(p, s, density))
+    rays = shortwave(p, air, today.weather.diffuse, stand, surface_albedo(p, s, today.snow_density))
     gpp = {species: photosynthesis(p, s, air, today, rays, species, seconds) for species in SPECIES}
 
     h_canopy = canopy_exchange(p, air, today, rays.cover)
@@ -779,7 +857,20 @@ def take_step(p, s, today, step, steps_per_day):
     surface_start, deep_start = nodes[0].temperature(s.surface_heat), nodes[1].temperature(s.deep_heat)
     h_ground = ground_exchange(p, s, air, today, ground_start)
     dry, wetted = evaporation_coefficients(p, s, air, today, rays, wet, seconds)
-    g_g1, g_12, g_2b = ground_conductances(p, s, nodes, ground_start, surface_start, deep_start, snow, density)
+    organic_start = organic_node(p, s, s.organic_water).temperature(s.organic_heat)
+    thawed_share = 1.0 - frozen_share(p, organic_start) * p.soil_freezing
+    moss_water = s.organic_water * thawed_share
+    soil_reach = water_left_by_leaves(p, s, seconds)
+    g_go, g_o1, g_12, g_2b = ground_conductances(
+        p, s, nodes, organic_start, surface_start, deep_start, snow, today.snow_density
+    )
+    if snow > 0.0:
+        vapour_conductance = snow_conductance(p, air, h_ground, snow, seconds)
+    else:
+        wetness = min(moss_water / sum(organic_water_held(p, s)), 1.0)
+        exchange = max(h_ground, p.minimum_conductance)
+        floor_water = moss_water + soil_reach
+        vapour_conductance = floor_conductance(p, air, today, exchange, wetness, floor_water, ground_start, seconds)
     balance = EnergyBalance(
         seconds=seconds,
         air=air.celsius,
@@ -794,14 +885,14 @@ def take_step(p, s, today, step, steps_per_day):
         dry=dry,
         wet=wetted,
         wet_limit=VAPORISATION * rain_held / seconds,
-        bare_latent=bare_ground_latent_heat(p, s, air, rays, ground_start, seconds),
-        vapour_conductance=vapour_conductance(p, air, h_ground, snow, seconds),
+        vapour_conductance=vapour_conductance,
         h_canopy=h_canopy,
         h_ground=max(h_ground, p.minimum_conductance),
         h_trunk=p.trunk_air_conductance * p.woody_area_index * stand.cover,
         g_ct=p.trunk_canopy_conductance * stand.cover,
         g_tg=p.trunk_ground_conductance * stand.cover,
-        g_g1=g_g1,
+        g_go=g_go,
+        g_o1=g_o1,
         g_12=g_12,
         g_2b=g_2b,
         boundary=p.deep_boundary_temperature_k - FREEZING_K,
@@ -811,36 +902,47 @@ def take_step(p, s, today, step, steps_per_day):
         ground_start=ground_start,
         trunk_capacity=s.trunk_capacity,
         trunk_start=s.trunk,
+        organic_capacity=organic_node(p, s, s.organic_water).heat_capacity(s.organic_heat),
+        organic_start=organic_start,
         surface_capacity=nodes[0].heat_capacity(s.surface_heat),
         surface_start=surface_start,
         deep_capacity=nodes[1].heat_capacity(s.deep_heat),
         deep_start=deep_start,
     )
-    canopy, trunk, ground, surface, deep = balance.solve()
+    canopy, trunk, ground, organic, surface, deep = balance.solve()
 
     # Fluxes at these temperatures, and the stores that follow from them.
     canopy_net, canopy_sensible, transpiration, rain_latent, _ = balance.canopy(canopy, trunk, ground)
     ground_net, ground_sensible, ground_latent = balance.ground(canopy, ground)
-    _, ground_gain, surface_gain, deep_gain = balance.gains(canopy, trunk, ground, surface, deep)
+    _, ground_gain, organic_gain, surface_gain, deep_gain = balance.gains(canopy, trunk, ground, organic, surface, deep)
     into_boundary = g_2b * (deep - balance.boundary)
     transpired, dried = seconds * transpiration / VAPORISATION, seconds * rain_latent / VAPORISATION
-    vapour = seconds * balance.snow_vapour(ground)
-    evaporated = 0.0 if snow > 0.0 else seconds * ground_latent / VAPORISATION
+    vapour = seconds * balance.ground_vapour(ground) if snow > 0.0 else 0.0
+    evaporated = 0.0 if snow > 0.0 else min(seconds * ground_latent / VAPORISATION, moss_water + soil_reach)
     sensible = canopy_sensible + balance.h_trunk * (trunk - air.celsius) + ground_sensible
     latent = transpiration + rain_latent + ground_latent + SUBLIMATION * aloft.sublimated / seconds
 
-    heat += seconds * ground_gain - ICE_HEAT * vapour * ground_start
+    not_evaporated = 0.0 if snow > 0.0 else ground_latent - VAPORISATION * evaporated / seconds
+    heat += seconds * (ground_gain + not_evaporated) - ICE_HEAT * vapour * ground_start
     melted = min(max(heat, 0.0) / FUSION, snow - vapour)
     snow_left = snow - vapour - melted
-    water = s.soil_water + to_soil + melted - transpired - evaporated
+    from_moss = evaporated * moss_water / (moss_water + soil_reach) if moss_water > 0.0 else 0.0
+    organic_water = max(s.organic_water + to_soil + melted - from_moss, 0.0)
+    organic_heat = s.organic_heat + seconds * organic_gain
+    organic_heat += WATER_HEAT * (to_soil * max(air.celsius, 0.0) - from_moss * max(organic_start, 0.0))
+    organic_now = organic_node(p, s, organic_water).temperature(organic_heat)
+    liquid = organic_water * (1.0 - frozen_share(p, organic_now) * p.soil_freezing)
+    beyond = max(organic_water - sum(organic_water_held(p, s)), 0.0)
+    pores = WATER_DENSITY * p.organic_porosity * organic_thickness(p, s)
+    drained = max(min(beyond, liquid), organic_water - pores)
+    water = s.soil_water + drained - transpired - (evaporated - from_moss)
     runoff = max(water - p.max_water_content_mm, 0.0)
     biomass = {species: getattr(s, f"{species}_biomass") for species in SPECIES}
     respiration = {
         species: autotrophic_respiration(p, air, stand.lai[species], biomass[species], gpp[species], seconds)
         for species in SPECIES
     }
-    into_soil = g_g1 * (ground - surface)
-    top = top_of_mineral_soil(p, soil_conductivity(p, ground_start), surface, into_soil)
+    top = top_of_mineral_soil(p, soil_conductivity(p, organic_start), surface, g_o1 * (organic - surface))
     decay = heterotrophic_respiration(p, s, top)
 
     state = {
@@ -853,9 +955,12 @@ def take_step(p, s, today, step, steps_per_day):
         "trunk": trunk,
         "trunk_capacity": s.trunk_capacity,
         "ground": (heat - FUSION * melted) / (p.skin_heat_capacity + ICE_HEAT * snow_left),
+        "organic_heat": organic_heat - WATER_HEAT * drained * max(organic_now, 0.0),
+        "organic_water": organic_water - drained,
         "surface_heat": s.surface_heat + seconds * surface_gain,
         "deep_heat": s.deep_heat + seconds * deep_gain,
         "swe": snow_left,
+        "snow_density": snow_density(s, aloft.to_ground, fresh_snow_density(p, air, floor_wind(p, s, air, today))),
         "albedo": snow_albedo(p, s, ground_start, aloft.to_ground, snow, seconds),
         "canopy_rain": rain_held - dried,
         "canopy_snow": aloft.store,
@@ -871,6 +976,7 @@ def take_step(p, s, today, step, steps_per_day):
         "snowfall_mm": air.snow,
         "evapotranspiration_mm": transpired + dried + evaporated + vapour + aloft.sublimated,
         "transpiration_mm": transpired,
+        "floor_evaporation_mm": evaporated,
         "runoff_mm": runoff,
         "sublimation_mm": vapour + aloft.sublimated,
         "canopy_sublimation_mm": aloft.sublimated,
@@ -878,7 +984,7 @@ def take_step(p, s, today, step, steps_per_day):
         "net_radiation_mj_m2": megajoules * (canopy_net + ground_net),
         "sensible_heat_mj_m2": megajoules * sensible,
         "latent_heat_mj_m2": megajoules * latent,
-        "ground_heat_mj_m2": megajoules * into_soil,
+        "ground_heat_mj_m2": megajoules * g_go * (ground - organic),
         "ground_shortwave_mj_m2": megajoules * rays.ground,
         "boundary_warming_mj_m2": megajoules * max(into_boundary, 0.0),
         "boundary_cooling_mj_m2": megajoules * max(-into_boundary, 0.0),
@@ -890,6 +996,9 @@ def take_step(p, s, today, step, steps_per_day):
         "canopy_temperature_c": canopy,
         "ground_temperature_c": state["ground"],
         "soil_top_temperature_c": top,
+        "organic_temperature_c": organic_start,
+        "organic_water_mm": state["organic_water"],
+        "snow_depth_m": state["swe"] / state["snow_density"],
         "surface_soil_temperature_c": surface_start,
         "deep_soil_temperature_c": deep_start,
     }

@@ -95,6 +95,7 @@ def draw_state(generator, p, day):
     capacity = p.max_water_content_mm
     surface, deep = p.surface_soil_depth_m, p.boundary_depth_m - p.surface_soil_depth_m
     ice = FUSION * WATER_DENSITY * p.soil_freezing_water
+    water = generator.choice([0.0, generator.uniform(0.0, 120.0)], p=[0.1, 0.9])
     state = {
         "conifer_biomass": generator.choice([0.0, 1e-6, generator.uniform(0.0, 12.0)], p=[0.1, 0.1, 0.8]),
         "deciduous_biomass": generator.choice([0.0, 1e-6, generator.uniform(0.0, 12.0)], p=[0.1, 0.1, 0.8]),
@@ -105,9 +106,12 @@ def draw_state(generator, p, day):
         "trunk": generator.normal(season, 8.0),
         "trunk_capacity": 1e4,
         "ground": min(ground, 0.0) if swe > 0.0 else ground,
+        "organic_heat": drawn_organic_heat(generator, p, water),
+        "organic_water": water,
         "surface_heat": ice * surface * generator.choice([0.0, generator.uniform(-1.3, 0.3)], p=[0.05, 0.95]),
         "deep_heat": ice * deep * generator.choice([0.0, generator.uniform(-1.2, 0.1)], p=[0.05, 0.95]),
         "swe": swe,
+        "snow_density": generator.uniform(40.0, 500.0),
         "albedo": generator.uniform(p.snow_albedo_old, p.snow_albedo_fresh),
         "canopy_rain": generator.choice([0.0, generator.uniform(0.0, 1.5)]),
         "canopy_snow": generator.choice([0.0, generator.uniform(0.0, 0.5), generator.uniform(0.0, 20.0)]),
@@ -119,6 +123,13 @@ def draw_state(generator, p, day):
         ages = generator.random(AGES) < generator.uniform(0.02, 1.0)
         state[f"{species}_stems"] = present * ages * generator.exponential(15.0, AGES)
     return state
+
+
+def drawn_organic_heat(generator, p, water):
+    """Enthalpy [J m-2] of an organic layer with so much water [mm]: thawed, at 0 degC, freezing or frozen."""
+    warm = (0.01 * p.organic_heat_capacity_dry + 2100.0 * water) * generator.uniform(-20.0, 15.0)
+    ice = FUSION * water * generator.choice([0.0, generator.uniform(0.0, 1.0)])
+    return generator.choice([warm if warm > 0.0 else warm - FUSION * water, -ice, 0.0], p=[0.6, 0.35, 0.05])
 
 
 def draw_generated(generator):
@@ -202,7 +213,11 @@ def scale(name, value, seconds):
 def features_of(p, before, after, fluxes, steps_per_day):
     """What a step has that a test of it should see."""
     melted_out = before.swe > 0.0 and after["swe"] == 0.0
-    temperature = {"surface": fluxes["surface_soil_temperature_c"], "deep": fluxes["deep_soil_temperature_c"]}
+    temperature = {
+        "organic": fluxes["organic_temperature_c"],
+        "surface": fluxes["surface_soil_temperature_c"],
+        "deep": fluxes["deep_soil_temperature_c"],
+    }
     stems = {species: float(getattr(before, f"{species}_stems").sum()) for species in SPECIES}
     found = {
         "bare ground": before.swe == 0.0 and after["swe"] == 0.0,
@@ -220,6 +235,9 @@ def features_of(p, before, after, fluxes, steps_per_day):
         "respiration takes all": 0.0 < before.conifer_biomass and after["conifer_biomass"] < 1e-15,
         "night": fluxes["shortwave_mj_m2"] == 0.0,
         "dry soil": before.soil_water == 0.0,
+        "the floor evaporates": fluxes["floor_evaporation_mm"] > 0.0,
+        "the organic layer drains": before.organic_water > after["organic_water"] + fluxes["floor_evaporation_mm"],
+        "the organic layer is wetted": before.organic_water < after["organic_water"],
         "runoff": fluxes["runoff_mm"] > 0.0,
         "conifers": stems["conifer"] > 0.0 and stems["deciduous"] == 0.0,
         "deciduous trees": stems["conifer"] == 0.0 and stems["deciduous"] > 0.0,
