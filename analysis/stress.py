@@ -219,7 +219,7 @@ def budgets(before: np.ndarray, after: np.ndarray, record: dict) -> Iterator[tup
     )
     yield "carbon_of_the_year_kgc_m2", np.abs(carbon - crossed) / (1.0 + stock)
 
-    water, stock = change("swe", "canopy_snow", "canopy_rain", "soil_water")
+    water, stock = change("swe", "canopy_snow", "canopy_rain", "organic_water", "soil_water")
     crossed = r["precipitation_mm"] - r["evapotranspiration_mm"] - r["runoff_mm"]
     flux = r["precipitation_mm"] + np.abs(r["evapotranspiration_mm"]) + r["runoff_mm"]
     yield "water_of_the_year_mm", np.abs(water - crossed) / (1.0 + stock + flux)
@@ -254,6 +254,8 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         yield name, s[name], 0.0, np.inf
     yield "stems by age", stems, 0.0, np.inf
     yield "soil_water", s["soil_water"], 0.0, p["max_water_content_mm"] * rounded
+    yield "organic_water", s["organic_water"], 0.0, np.inf
+    yield "snow_density", s["snow_density"], p["snow_density_least"] / rounded, np.inf
     plant_area = p["max_lai_conifer"] + p["max_lai_deciduous"] * (1.0 + p["leafless_share"]) + p["woody_area_index"]
     yield "canopy_rain", s["canopy_rain"], 0.0, p["rain_capacity_mm"] * plant_area * rounded
     yield "trunk_capacity", s["trunk_capacity"], LEAST_TRUNK_CAPACITY, np.inf
@@ -283,6 +285,7 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         "thinned_stems_ha",
         "drought_index",
         "peak_swe_mm",
+        "peak_snow_depth_m",
     ):
         yield name, r[name], 0.0, np.inf
     yield "snowfall_mm", r["snowfall_mm"], 0.0, r["precipitation_mm"] * rounded
@@ -312,7 +315,7 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
     unusual = group.sites == "physical"
     for name, farthest in FARTHEST_FROM_AIR.items():
         yield f"daily {name} less air", d[name] - d["air_temperature_c"], -farthest[unusual], farthest[unusual]
-    for name in ("surface_soil_temperature_c", "deep_soil_temperature_c"):
+    for name in ("organic_temperature_c", "surface_soil_temperature_c", "deep_soil_temperature_c"):
         yield f"daily {name}", d[name], *SOIL_TEMPERATURES[unusual]
 
 

@@ -37,9 +37,11 @@ def thaw_depth(
     if deep > 0.0:
         share = deep / (deep - boundary) if boundary < 0.0 else 1.0
         return organic + deep_node + share * (boundary_depth - deep_node)
+    if seconds <= 0.0:
+        return 0.0
     to_melt_organic = 0.5 * organic_latent * organic / organic_conductivity
     if warmth <= to_melt_organic:
-        return organic * math.sqrt(warmth / to_melt_organic) if warmth > 0.0 else 0.0
+        return organic * math.sqrt(warmth / to_melt_organic)
     seconds *= 1.0 - to_melt_organic / warmth
     warmth -= to_melt_organic
     top = 0.5 * warmth / seconds

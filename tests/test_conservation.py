@@ -30,7 +30,7 @@ CASES = {
 }
 YEARS = 3
 HEAVY_STORES = ("conifer_biomass", "deciduous_biomass", "soil_carbon", "products")
-WATER_STORES = ("swe", "canopy_snow", "canopy_rain", "soil_water")
+WATER_STORES = ("swe", "canopy_snow", "canopy_rain", "organic_water", "soil_water")
 NEVER_NEGATIVE = (*HEAVY_STORES, *WATER_STORES, "organic_depth", "trunk_capacity", "drought", "albedo")
 MAY_BE_NAN = {"summer_albedo", "winter_albedo"}  # where no light arrives in the season
 
@@ -100,6 +100,8 @@ def test_no_stock_is_negative(run):
             "swe_mm",
             "canopy_snow_mm",
             "soil_water_mm",
+            "organic_water_mm",
+            "snow_depth_m",
             "runoff_mm",
             "lai",
             "organic_layer_m",
@@ -175,7 +177,8 @@ def test_water_of_every_day(run):
     for year in run:
         d = year.daily
         held = (d.precipitation_mm - d.evapotranspiration_mm - d.runoff_mm).cumsum(axis=1)
-        held += store(year.before, WATER_STORES)[:, None] - d.swe_mm - d.canopy_snow_mm - d.soil_water_mm
+        held += store(year.before, WATER_STORES)[:, None] - d.swe_mm - d.canopy_snow_mm
+        held -= d.organic_water_mm + d.soil_water_mm
         round_off = 1e-7 + 1e-11 * (d.precipitation_mm + d.evapotranspiration_mm).sum(axis=1)
         assert (held >= -round_off[:, None]).all()
         assert (np.abs(held[:, -1] - store(year.after, ["canopy_rain"])) <= round_off).all()

@@ -13,13 +13,16 @@ from hypothesis import strategies as st
 from numba.core.dispatcher import Dispatcher
 from pytest import approx
 
+import sim.active_layer
 import sim.canopy
 import sim.carbon
 import sim.demography
 import sim.disturbance
+import sim.evaporation
 import sim.interception
 import sim.management
 import sim.mathematics
+import sim.organic
 import sim.photosynthesis
 import sim.radiation
 import sim.response
@@ -38,7 +41,8 @@ def plain(module):
     return SimpleNamespace(**{k: uncompiled(v) if isinstance(v, Dispatcher) else v for k, v in vars(module).items()})
 
 
-canopy, carbon, demography, disturbance = map(plain, (sim.canopy, sim.carbon, sim.demography, sim.disturbance))
+active_layer, canopy, carbon, demography = map(plain, (sim.active_layer, sim.canopy, sim.carbon, sim.demography))
+disturbance, evaporation, organic = map(plain, (sim.disturbance, sim.evaporation, sim.organic))
 interception, management, mathematics = map(plain, (sim.interception, sim.management, sim.mathematics))
 photosynthesis, radiation, response = map(plain, (sim.photosynthesis, sim.radiation, sim.response))
 snow, soil, structure = map(plain, (sim.snow, sim.soil, sim.structure))
@@ -256,8 +260,41 @@ def test_snow_conductivity_of_sturm(density, expected):
     assert snow.conductivity(density) == approx(expected, abs=1e-4)
 
 
-def test_snow_density():
-    assert [snow.bulk_density(c, 217.0, 275.0) for c in (0.0, 0.5, 1.0)] == [275.0, 246.0, 217.0]
+def test_density_of_fresh_snow():
+    pahaut = (109.0, 6.0, 26.0, 50.0)
+    assert snow.fresh_density(0.0, 0.0, *pahaut) == 109.0
+    assert snow.fresh_density(-5.0, 4.0, *pahaut) == approx(109.0 - 30.0 + 52.0)
+    assert snow.fresh_density(-30.0, 1.0, *pahaut) == 50.0
+
+
+def test_depths_of_old_and_fresh_snow_add_up():
+    density = snow.mixed_density(60.0, 240.0, 5.0, 50.0)
+    assert 65.0 / density == approx(60.0 / 240.0 + 5.0 / 50.0)
+    assert snow.mixed_density(0.0, 240.0, 5.0, 50.0) == approx(50.0)
+    assert snow.mixed_density(0.0, 240.0, 0.0, 50.0) == 240.0
+
+
+ANDERSON = (3.7e7, 0.081, 0.018, 2.8e-6, 0.042, 0.046, 150.0)
+
+
+def test_snow_settles_under_weight_warmth_and_less_when_dense():
+    def gain(swe=60.0, density=150.0, celsius=-8.0):
+        return snow.settling(swe, density, celsius, *ANDERSON)
+
+    assert gain(swe=0.0) == approx(2.8e-6 * math.exp(-0.042 * 8.0))
+    assert gain(swe=0.0, density=250.0) == approx(gain(swe=0.0) * math.exp(-4.6))
+    assert gain(swe=120.0) - gain(swe=60.0) == approx(gain(swe=60.0) - gain(swe=0.0))
+    assert gain(celsius=0.0) > gain(celsius=-8.0) > gain(density=250.0)
+
+
+def test_a_taiga_snowpack_is_as_dense_as_measured():
+    """60 mm in five months at -8 degC: Sturm et al. (2010) have 217 kg m-3 for the taiga, standard deviation 56."""
+    density, swe = 60.0, 0.0
+    for _ in range(150):
+        density = snow.mixed_density(swe, density, 0.4, 60.0)
+        swe += 0.4
+        density *= 1.0 + 86400.0 * snow.settling(swe, density, -8.0, *ANDERSON)
+    assert 160.0 < density < 275.0
 
 
 ALBEDO = (0.85, 0.7, 0.5, 1000.0, 100.0, 10.0, 1800.0)  # fresh, cold, old, hours cold and melting, refreshing, step
@@ -348,39 +385,76 @@ def test_frozen_share_and_conductivity():
 
 def test_organic_layer_grows_slowly_and_decays_when_its_canopy_is_gone():
     depths = (0.165, 0.075, 0.08, 0.002, 15.0)
-    assert soil.organic_layer(0.165, 1.0, 0.0, *depths) == approx(0.165)
-    assert soil.organic_layer(0.05, 1.0, 0.0, *depths) == approx(0.052)
-    assert soil.organic_layer(0.1645, 1.0, 0.0, *depths) == approx(0.165)
-    assert soil.organic_layer(0.165, 0.0, 0.0, *depths) == approx(0.165 - 0.085 / 15.0)
-    assert soil.organic_layer(0.12, 0.5, 0.5, *depths) == approx(0.12)
+    assert organic.organic_growth(0.165, 1.0, 0.0, *depths) == approx(0.165)
+    assert organic.organic_growth(0.05, 1.0, 0.0, *depths) == approx(0.052)
+    assert organic.organic_growth(0.1645, 1.0, 0.0, *depths) == approx(0.165)
+    assert organic.organic_growth(0.165, 0.0, 0.0, *depths) == approx(0.165 - 0.085 / 15.0)
+    assert organic.organic_growth(0.12, 0.5, 0.5, *depths) == approx(0.12)
 
 
 def test_thaw_depth_of_stefan():
     latent, warmth, days = 86.8e6, 8.0 * 86400.0 * 120, 86400.0 * 120
-    rest = (-3.0, 2.5, 12.0, 1.2, 1.7, 0.2)  # boundary, deep node, boundary's depth, conductivities
+    rest = (-3.0, 2.5, 12.0, 1.2, 1.7)  # boundary, deep node, boundary's depth, conductivities
+
+    def thaw(organic, ice, warmth, deep, *capacities, rest=rest, seconds=days):
+        return active_layer.thaw_depth(organic, ice, 0.2, warmth, seconds, deep, *rest, *capacities, latent)
+
     # Without moss, cold soil or heat capacity: sqrt(2 k T t / L).
-    assert soil.thaw_depth(0.0, warmth, days, 0.0, *rest, 0.0, 0.0, latent) == approx(
-        math.sqrt(2.4 * warmth / latent), rel=1e-12
-    )
+    assert thaw(0.0, 0.0, warmth, 0.0, 0.0, 0.0) == approx(math.sqrt(2.4 * warmth / latent), rel=1e-12)
     # What goes in is what melts, warms and goes on: k T t = (above + X / 2) (heat X + cold).
-    depth = soil.thaw_depth(0.1, warmth, days, -2.0, *rest, 2.3e6, 1.7e6, latent) - 0.1
+    depth = thaw(0.1, 0.0, warmth, -2.0, 2.3e6, 1.7e6) - 0.1
     heat, cold = latent + 2.3e6 * 2.0, 4.0 * math.sqrt(1.7 * 1.7e6 * days / math.pi)
     assert (0.1 * 1.2 / 0.2 + 0.5 * depth) * (heat * depth + cold) == approx(1.2 * warmth, rel=1e-12)
     assert 0.8 < depth < 1.0
-    assert soil.thaw_depth(0.1, 0.0, 0.0, -2.0, *rest, 2.3e6, 1.7e6, latent) == 0.1
+    # Ice of the organic layer melts first, by Stefan's formula; what is left of the season thaws the soil.
+    ice, enough = 20e6, 0.5 * 20e6 * 0.1 / 0.2
+    assert thaw(0.1, ice, 0.25 * enough, -2.0, 2.3e6, 1.7e6) == approx(0.05)
+    assert thaw(0.1, ice, enough, -2.0, 2.3e6, 1.7e6) == approx(0.1)
+    later = thaw(0.1, 0.0, warmth - enough, -2.0, 2.3e6, 1.7e6, seconds=days * (1.0 - enough / warmth))
+    assert thaw(0.1, ice, warmth, -2.0, 2.3e6, 1.7e6) == approx(later)
+    assert thaw(0.1, ice, 0.0, -2.0, 2.3e6, 1.7e6, seconds=0.0) == 0.0
     # A deep node that is thawed: permafrost begins on the line from it to the boundary.
-    assert soil.thaw_depth(0.1, warmth, days, 1.0, *rest, 2.3e6, 1.7e6, latent) == approx(0.1 + 2.5 + 9.5 / 4.0)
-    assert soil.thaw_depth(0.1, warmth, days, 1.0, 2.0, *rest[1:], 2.3e6, 1.7e6, latent) == approx(12.1)
+    assert thaw(0.1, ice, warmth, 1.0, 2.3e6, 1.7e6) == approx(0.1 + 2.5 + 9.5 / 4.0)
+    assert thaw(0.1, ice, warmth, 1.0, 2.3e6, 1.7e6, rest=(2.0, *rest[1:])) == approx(12.1)
+
+
+def test_organic_soil_conducts_by_what_fills_its_pores():
+    assert organic.wet_conductivity(0.0, 0.05, 0.54) == 0.05
+    assert organic.wet_conductivity(0.4, 0.05, 0.54) == approx(0.246)
+    assert organic.wet_conductivity(1.3, 0.05, 0.54) == 0.54
+
+
+def test_what_the_organic_layer_does_not_hold_drains_unless_it_is_ice():
+    assert organic.drained(30.0, 0.0, 45.0, 150.0) == 0.0
+    assert organic.drained(60.0, 0.0, 45.0, 150.0) == approx(15.0)
+    assert organic.drained(60.0, 0.9, 45.0, 150.0) == approx(6.0)
+    assert organic.drained(60.0, 1.0, 45.0, 150.0) == 0.0
+    assert organic.drained(160.0, 1.0, 45.0, 150.0) == approx(10.0)
+
+
+def test_melt_that_seeps_into_a_frozen_layer_freezes_and_warms_it():
+    """Its enthalpy stays, its water grows: so its temperature rises by the heat of fusion."""
+    layer = (1.0, 0.15, 1.75e5)
+    cold = soil.enthalpy(-8.0, *organic.layer_capacities(*layer, 40.0), 1.0)
+    warmed = soil.temperature(cold, *organic.layer_capacities(*layer, 42.0), 1.0)
+    capacity = 1.75e5 * 0.15 + 2100.0 * 41.0
+    assert warmed + 8.0 == approx(2.0 * 3.34e5 / capacity, rel=0.1)
+
+
+def test_moss_gives_vapour_as_air_and_wetness_let_it():
+    assert evaporation.moss_conductance(0.01, 0.0, 300.0) == 0.0
+    assert evaporation.moss_conductance(0.01, 1.0, 300.0) == approx(1.0 / (100.0 + 300.0))
+    assert evaporation.moss_conductance(0.01, 0.5, 300.0) == approx(1.0 / (100.0 + 1200.0))
 
 
 def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
-    """The elimination from the bottom up against a general solver of the same four equations."""
+    """The elimination from the bottom up against a general solver of the same five equations."""
     generator = np.random.default_rng(0)
     for _ in range(20):
-        (trunk, ground, surface, deep, air, boundary, canopy_now) = generator.uniform(-20.0, 20.0, 7)
-        (trunk_inertia, ground_inertia, surface_inertia, deep_inertia) = generator.uniform(1.0, 900.0, 4)
-        (canopy_trunk, trunk_air, trunk_ground, ground_air, vapour, ground_surface, surface_deep, below) = (
-            generator.uniform(0.0, 30.0, 8)
+        (trunk, ground, moss, surface, deep, air, boundary, canopy_now) = generator.uniform(-20.0, 20.0, 8)
+        (trunk_inertia, ground_inertia, moss_inertia, surface_inertia, deep_inertia) = generator.uniform(1.0, 900.0, 5)
+        (canopy_trunk, trunk_air, trunk_ground, ground_air, vapour, ground_moss, moss_surface, surface_deep, below) = (
+            generator.uniform(0.0, 30.0, 9)
         )
         source, emission, slope, emissivity, cover = *generator.uniform(0.0, 400.0, 2), 4.6, 0.97, generator.random()
         canopy_emission = generator.uniform(200.0, 400.0)
@@ -388,7 +462,9 @@ def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
             deep_base,
             deep_by_surface,
             surface_base,
-            surface_by_ground,
+            surface_by_moss,
+            moss_base,
+            moss_by_ground,
             trunk_base,
             trunk_by_canopy,
             trunk_by_ground,
@@ -413,9 +489,12 @@ def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
             emissivity,
             cover,
             air,
+            moss,
+            moss_inertia,
+            ground_moss,
             surface,
             surface_inertia,
-            ground_surface,
+            moss_surface,
             deep,
             deep_inertia,
             surface_deep,
@@ -423,25 +502,29 @@ def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
             boundary,
         )
         new_ground = ground_base + ground_by_emission * canopy_emission + ground_by_canopy * canopy_now
-        new_surface = surface_base + surface_by_ground * new_ground
+        new_moss = moss_base + moss_by_ground * new_ground
+        new_surface = surface_base + surface_by_moss * new_moss
         new = [
             trunk_base + trunk_by_canopy * canopy_now + trunk_by_ground * new_ground,
             new_ground,
+            new_moss,
             new_surface,
             deep_base + deep_by_surface * new_surface,
         ]
-        # Inertia x change = heat in - heat out, for trunk, ground, surface and deep soil.
+        # Inertia x change = heat in - heat out, for trunk, ground, organic layer, surface and deep soil.
         matrix = np.array(
             [
-                [trunk_inertia + canopy_trunk + trunk_air + trunk_ground, -trunk_ground, 0.0, 0.0],
+                [trunk_inertia + canopy_trunk + trunk_air + trunk_ground, -trunk_ground, 0.0, 0.0, 0.0],
                 [
                     -trunk_ground,
-                    ground_inertia + emissivity * slope + ground_air + vapour + trunk_ground + ground_surface,
-                    -ground_surface,
+                    ground_inertia + emissivity * slope + ground_air + vapour + trunk_ground + ground_moss,
+                    -ground_moss,
+                    0.0,
                     0.0,
                 ],
-                [0.0, -ground_surface, surface_inertia + ground_surface + surface_deep, -surface_deep],
-                [0.0, 0.0, -surface_deep, deep_inertia + surface_deep + below],
+                [0.0, -ground_moss, moss_inertia + ground_moss + moss_surface, -moss_surface, 0.0],
+                [0.0, 0.0, -moss_surface, surface_inertia + moss_surface + surface_deep, -surface_deep],
+                [0.0, 0.0, 0.0, -surface_deep, deep_inertia + surface_deep + below],
             ]
         )
         right = [
@@ -451,6 +534,7 @@ def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
             + emissivity * (cover * canopy_emission - emission + slope * ground)
             + ground_air * air
             + vapour * ground,
+            moss_inertia * moss,
             surface_inertia * surface,
             deep_inertia * deep + below * boundary,
         ]

@@ -9,13 +9,15 @@ from scripts import run_script
 
 import sim
 from analysis.validation import soil_column
-from analysis.validation.conduction import Column, Grid, Ground, Surface, layer_mean, spun_up, thawed_depth
+from analysis.validation.conduction import Above, Column, Grid, Ground, layer_mean, spun_up, thawed_depth
 from analysis.validation.soil_column import LAYER_EDGES_M, SCHEMES, layers_to
 from analysis.validation.surface import record_year
 from sim.block import namespace
+from sim.ground_heat import ground_conductances, ground_temperatures
 from sim.jit import uncompiled
+from sim.organic import organic_capacities
 from sim.parameters import check_constants, check_mechanisms
-from sim.soil import soil_conductances
+from sim.soil import enthalpy
 from sim.spin_up import INITIAL_RANGES, first_state
 from sim.state import DAYS, PARAMETER_NAMES, block_dtype, daily_dtype
 from sim.year import simulate_year
@@ -25,9 +27,9 @@ GROUND = Ground.of(PARAMETERS)
 YEAR = 2.0 * np.pi * np.arange(DAYS) / DAYS
 
 
-def driven_by(temperature, snow=0.0, organic=0.0) -> Surface:
-    """A surface of so many days, with the same snow and organic layer throughout."""
-    return Surface(np.asarray(temperature, float), np.full(len(temperature), snow), np.full(len(temperature), organic))
+def driven_by(temperature, resistance=0.0) -> Above:
+    """What lies above, of so many days, with the same resistance throughout."""
+    return Above(np.asarray(temperature, float), np.full(len(temperature), resistance))
 
 
 def block():
@@ -42,8 +44,8 @@ def block():
 
 @pytest.mark.parametrize("grid", SCHEMES.values(), ids=SCHEMES)
 def test_heat_gained_is_the_heat_that_came_in(grid):
-    column = Column(grid, GROUND, -2.0, 0.12)
-    year = driven_by(-4.0 - 15.0 * np.cos(YEAR), snow=0.5, organic=0.12)
+    column = Column(grid, GROUND, -2.0)
+    year = driven_by(-4.0 - 15.0 * np.cos(YEAR), resistance=1.0)
     before = column.heat.sum()
     _, (surface, warming, cooling) = column.run(year)
     assert abs(surface) > 5.0 and warming + cooling > 0.5
@@ -54,8 +56,8 @@ def test_the_thawing_front_of_neumann():
     """Frozen ground under a surface that is suddenly warm (Carslaw and Jaeger 1959, 11.2)."""
     ground = GROUND._replace(freezing_range=0.02, boundary_c=-3.0)
     warm, days = 8.0, 100
-    column = Column(Grid(LAYER_EDGES_M), ground, -3.0, 0.0)
-    daily, _ = column.run(driven_by(np.full(days, warm)))
+    column = Column(Grid(LAYER_EDGES_M), ground, -3.0)
+    daily, _ = column.run(driven_by(np.full(days, warm)), days)
 
     thawed = ground.thawed_conductivity / ground.thawed_capacity
     frozen = ground.frozen_conductivity / ground.frozen_capacity
@@ -81,7 +83,7 @@ def test_the_annual_wave_decays_with_depth():
     """In thawed ground, by 1/e in the damping depth, and later by a radian."""
     ground = GROUND._replace(boundary_c=20.0)
     grid = Grid(LAYER_EDGES_M)
-    column = Column(grid, ground, 20.0, 0.0)
+    column = Column(grid, ground, 20.0)
     for _ in range(3):
         daily, _ = column.run(driven_by(20.0 + 10.0 * np.sin(YEAR)))
     damping = math.sqrt(2.0 * ground.thawed_conductivity / (ground.thawed_capacity * 2.0 * math.pi / (365 * 86400.0)))
@@ -92,23 +94,26 @@ def test_the_annual_wave_decays_with_depth():
         assert lag == approx(grid.depths[k] / damping, abs=0.04)
 
 
-@pytest.mark.parametrize(("surface", "swe"), [(8.0, 0.0), (-20.0, 60.0), (-0.8, 30.0)])
-def test_two_nodes_have_the_simulators_conductances(surface, swe):
+@pytest.mark.parametrize("celsius", [8.0, -20.0, -0.8])
+def test_two_nodes_have_the_simulators_conductances(celsius):
     b = block()
     uncompiled(simulate_year)([b], 1, 1, np.zeros((0, 6, 1)), [])
-    snow = swe * b.w.snow_resistance[0]
-    steady = driven_by(np.full(DAYS, surface), snow=snow, organic=b.s.organic_depth[0])
+    b.s.organic_heat[0] = uncompiled(enthalpy)(celsius, *uncompiled(organic_capacities)(b, 0), GROUND.freezing_range)
+    uncompiled(ground_temperatures)(b, 0)
+    assert b.w.organic[0] == approx(celsius)
+    uncompiled(ground_conductances)(b, 0)
+    steady = driven_by(np.full(DAYS, celsius), 1.0 / b.w.surface_conductance[0] - b.w.upper_soil[0])
     column = spun_up(SCHEMES["two nodes: the simulator's"], GROUND, steady)
     for _ in range(100):
         daily, (entering, warming, cooling) = column.run(steady)
     b.s.surface_heat[0], b.s.deep_heat[0] = column.heat
-    b.s.ground[0], b.s.swe[0] = surface, swe
-    uncompiled(soil_conductances)(b, 0)
+    uncompiled(ground_temperatures)(b, 0)
+    uncompiled(ground_conductances)(b, 0)
     upper, lower = daily[-1]
     assert (b.w.surface[0], b.w.deep[0]) == approx((upper, lower), abs=1e-4)
     assert entering == approx(warming - cooling, rel=1e-4)
     per_year = 86400.0 * DAYS * 1e-6
-    assert b.w.surface_conductance[0] * (surface - upper) * per_year == approx(entering, rel=1e-3)
+    assert b.w.surface_conductance[0] * (celsius - upper) * per_year == approx(entering, rel=1e-3)
     assert b.w.deep_conductance[0] * (upper - lower) * per_year == approx(entering, rel=1e-3)
     assert b.w.boundary_conductance[0] * (lower - GROUND.boundary_c) * per_year == approx(entering, rel=1e-3)
 
@@ -120,9 +125,10 @@ def test_the_recorded_surface_is_the_simulators():
     uncompiled(record_year)(b, 1, no_weather, [], surface)
     other = block()
     uncompiled(simulate_year)([other], 1, DAYS, no_weather, [namespace(row) for row in daily])
-    assert surface[0, :, 0] == approx(daily["ground_temperature_c"][:, 0], abs=1e-12)
-    snowy = daily["swe_mm"][:, 0] > 0.0
-    assert 100 < snowy.sum() < 300 and ((surface[1, :, 0] > 0.0) == snowy).all()
+    assert surface[0, :, 0] == approx(daily["organic_temperature_c"][:, 0], abs=1e-12)
+    frozen = surface[0, :, 0] < -1.0
+    assert 100 < frozen.sum() < 300 and surface[1, frozen, 0].max() < surface[1, ~frozen, 0].max()
+    assert surface[1].min() > 0.0
 
 
 def test_depth_of_the_uppermost_zero():

@@ -1,4 +1,4 @@
-"""Heat conduction with phase change in any number of soil layers, driven by a given surface.
+"""Heat conduction with phase change in any number of layers of mineral soil, driven by the organic layer above.
 
 Freezing curve and mixing of conductivities are the simulator's (`sim.soil`), so that its two nodes and a column of
 many thin layers differ in nothing but their layers.
@@ -20,12 +20,11 @@ from sim.physical_constants import (
     WATER_DENSITY,
 )
 from sim.soil import conductivity, frozen_share, temperature
+from sim.state import DAYS
 
 STABLE_SHARE = 0.8  # of the longest step of an explicit scheme
 BALANCED_J_M2 = 2e4  # heat gained in a year of spin-up at which it ends
 LONGEST_SPIN_UP_YEARS = 600
-# Capacity thawed and frozen [J m-3 K-1] and water [m3 m-3] of an organic layer as moist as its conductivity takes it.
-ORGANIC_HEAT = (1.0e6, 0.55e6, 0.195)
 
 
 @dataclass(frozen=True)
@@ -33,16 +32,14 @@ class Grid:
     """Layers of mineral soil over a boundary of fixed temperature.
 
     edges : of the layers [m], from 0. nodes : depths at which the layers' temperatures stand [m]; None for their
-    middles. boundary : its depth [m]. organic_layers : into how many layers the organic layer above is divided; 0 for
-    one that resists and stores nothing, as the simulator's. closures : whether soil between surface and first node
-    conducts as the surface's temperature has it, soil between last node and boundary as the mean of the two has it,
-    and the last layer freezes no farther below its node than above it.
+    middles. boundary : its depth [m]. closures : whether soil above the first node conducts as the temperature above it
+    has it, soil between last node and boundary as the mean of the two has it, and the last layer freezes no farther
+    below its node than above it.
     """
 
     edges: tuple
     nodes: tuple | None = None
     boundary: float = CONSTANTS["boundary_depth_m"].low
-    organic_layers: int = 0
     closures: bool = False
 
     @property
@@ -61,8 +58,6 @@ class Ground(NamedTuple):
     latent: float
     freezing_range: float
     boundary_c: float
-    organic_thawed: float
-    organic_frozen: float
 
     @classmethod
     def of(cls, parameters: dict) -> "Ground":
@@ -76,72 +71,55 @@ class Ground(NamedTuple):
             LATENT_HEAT_FUSION * WATER_DENSITY * parameters["soil_freezing_water"],
             parameters["soil_freezing_range_k"],
             parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K,
-            parameters["organic_conductivity_thawed"],
-            parameters["organic_conductivity_frozen"],
         )
 
 
-class Surface(NamedTuple):
-    """What drives a column: temperature [degC] and resistance of the snow [m2 K W-1] of each interval, the same number
-    on every day; organic depth [m] of each day."""
+class Above(NamedTuple):
+    """What drives a column: temperature [degC] of what lies on the mineral soil, and the resistance from there to it
+    [m2 K W-1], of each interval, the same number on every day."""
 
     temperature: np.ndarray
-    snow: np.ndarray
-    organic: np.ndarray
+    resistance: np.ndarray
 
 
 @phase
-def conduct(
-    surface, ground, closures, organic_layers, organic_heat, thickness, freezing, above, below, heat, daily, flux
-):
+def conduct(driver, ground, closures, thickness, freezing, above, below, heat, daily, flux):
     """Conduct heat down a column, interval after interval, by explicit steps short enough to be stable.
 
     thickness, freezing : of each layer, and of its part that can freeze [m]; above, below : from its node to its upper
     edge, and to its lower edge or the boundary [m]; heat : its enthalpy [J m-2], advanced in place; (layers,) each.
-    The first `organic_layers` share the organic depth, with `organic_heat` per metre.
-    daily : temperatures at each day's end [degC], written, (days, layers); flux : heat into the surface, into the
+    daily : temperatures at each day's end [degC], written, (days, layers); flux : heat into the soil, into the
     boundary and out of it [MJ m-2], added up, (3,).
     """
     layers = len(heat)
     thawed, frozen = ground.thawed_capacity * thickness, ground.frozen_capacity * thickness
     latent = ground.latent * freezing
-    soft, hard = np.full(layers, ground.thawed_conductivity), np.full(layers, ground.frozen_conductivity)
-    soft[:organic_layers], hard[:organic_layers] = ground.organic_thawed, ground.organic_frozen
+    soft, hard = ground.thawed_conductivity, ground.frozen_conductivity
     node, upper, lower = np.empty(layers), np.empty(layers), np.empty(layers)
     down = np.empty(layers + 1)
     last = layers - 1
-    per_day = len(surface.temperature) // len(daily)
+    per_day = len(driver.temperature) // len(daily)
+    longest = SECONDS_PER_HOUR
+    for i in range(layers):
+        up = above[i] / hard + (below[i - 1] / hard if i > 0 else 0.0)
+        under = below[i] / hard + (above[i + 1] / hard if i < last else 0.0)
+        longest = min(longest, STABLE_SHARE * min(thawed[i], frozen[i]) / (1.0 / up + 1.0 / under))
+    steps = int(np.ceil(SECONDS_PER_DAY / per_day / longest))
+    seconds = SECONDS_PER_DAY / per_day / steps
     for day in range(len(daily)):
-        organic = surface.organic[day]
-        for i in range(organic_layers):
-            layer = organic / organic_layers
-            heat[i] *= layer / thickness[i]  # depth that comes or goes takes its heat along
-            thickness[i], above[i], below[i] = layer, 0.5 * layer, 0.5 * layer
-            thawed[i], frozen[i], latent[i] = organic_heat[0] * layer, organic_heat[1] * layer, organic_heat[2] * layer
-        longest = SECONDS_PER_HOUR
-        for i in range(layers):
-            up = above[i] / hard[i] + (below[i - 1] / hard[i - 1] if i > 0 else 0.0)
-            under = below[i] / hard[i] + (above[i + 1] / hard[i + 1] if i < last else 0.0)
-            longest = min(longest, STABLE_SHARE * min(thawed[i], frozen[i]) / (1.0 / up + 1.0 / under))
-        steps = int(np.ceil(SECONDS_PER_DAY / per_day / longest))
-        seconds = SECONDS_PER_DAY / per_day / steps
         for interval in range(day * per_day, (day + 1) * per_day):
-            top, snow = surface.temperature[interval], surface.snow[interval]
+            top, resistance = driver.temperature[interval], driver.resistance[interval]
             for _ in range(steps):
                 for i in range(layers):
                     node[i] = temperature(heat[i], thawed[i], frozen[i], latent[i], ground.freezing_range)
-                    k = conductivity(frozen_share(node[i], ground.freezing_range), soft[i], hard[i])
+                    k = conductivity(frozen_share(node[i], ground.freezing_range), soft, hard)
                     upper[i], lower[i] = above[i] / k, below[i] / k
                 if closures:
                     share = frozen_share(top, ground.freezing_range)
-                    upper[0] = above[0] / conductivity(share, soft[0], hard[0])
+                    upper[0] = above[0] / conductivity(share, soft, hard)
                     share = frozen_share(0.5 * (node[last] + ground.boundary_c), ground.freezing_range)
-                    lower[last] = below[last] / conductivity(share, soft[last], hard[last])
-                resistance = snow + upper[0]
-                if organic_layers == 0:
-                    share = frozen_share(0.5 * (top + node[0]), ground.freezing_range)
-                    resistance += organic / conductivity(share, ground.organic_thawed, ground.organic_frozen)
-                down[0] = (top - node[0]) / resistance
+                    lower[last] = below[last] / conductivity(share, soft, hard)
+                down[0] = (top - node[0]) / (resistance + upper[0])
                 for i in range(1, layers):
                     down[i] = (node[i - 1] - node[i]) / (lower[i - 1] + upper[i])
                 down[layers] = (node[last] - ground.boundary_c) / lower[last]
@@ -157,33 +135,27 @@ def conduct(
 class Column:
     """A grid and its heat; at first on a straight line of temperature from `top` [degC] to the boundary."""
 
-    def __init__(self, grid: Grid, ground: Ground, top: float, organic: float):
+    def __init__(self, grid: Grid, ground: Ground, top: float):
         self.grid, self.ground = grid, ground
-        moss = np.full(grid.organic_layers, organic / max(grid.organic_layers, 1))
-        self.thickness = np.concatenate([moss, np.diff(grid.edges)])
-        self.above = np.concatenate([0.5 * moss, grid.depths - grid.edges[:-1]])
-        self.below = np.concatenate([0.5 * moss, [*grid.edges[1:-1], grid.boundary] - grid.depths])
+        self.thickness = np.diff(grid.edges)
+        self.above = grid.depths - grid.edges[:-1]
+        self.below = np.array([*grid.edges[1:-1], grid.boundary]) - grid.depths
         self.freezing = self.thickness.copy()
         if grid.closures:
             self.freezing[-1] = min(self.thickness[-1], 2.0 * self.above[-1])
-        thawed, frozen, water = ORGANIC_HEAT
-        self.organic_heat = (thawed, frozen, LATENT_HEAT_FUSION * WATER_DENSITY * water)
-        per_metre = np.repeat([self.organic_heat, ground[2:5]], [len(moss), len(grid.depths)], axis=0)
-        capacity = per_metre * np.stack([self.thickness, self.thickness, self.freezing], axis=1)
+        capacity = np.array(ground[2:5]) * np.stack([self.thickness, self.thickness, self.freezing], axis=1)
         line = np.interp(grid.depths, [0.0, grid.boundary], [top, ground.boundary_c])
-        start = zip(np.concatenate([np.full(len(moss), top), line]), capacity, strict=True)
+        start = zip(line, capacity, strict=True)
         self.heat = np.array([uncompiled(soil.enthalpy)(t, *of, ground.freezing_range) for t, of in start])
 
-    def run(self, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-        """The mineral layers' temperatures at the end of each day [degC], (days, layers), and the heat into the
-        surface, into the boundary and out of it [MJ m-2], (3,)."""
-        daily, flux = np.zeros((len(surface.organic), len(self.heat))), np.zeros(3)
+    def run(self, driver: Above, days: int = DAYS) -> tuple[np.ndarray, np.ndarray]:
+        """The layers' temperatures at the end of each day [degC], (days, layers), and the heat into the soil, into the
+        boundary and out of it [MJ m-2], (3,)."""
+        daily, flux = np.zeros((days, len(self.heat))), np.zeros(3)
         conduct(
-            surface,
+            driver,
             self.ground,
             self.grid.closures,
-            self.grid.organic_layers,
-            self.organic_heat,
             self.thickness,
             self.freezing,
             self.above,
@@ -192,12 +164,12 @@ class Column:
             daily,
             flux,
         )
-        return daily[:, self.grid.organic_layers :], flux
+        return daily, flux
 
 
-def spun_up(grid: Grid, ground: Ground, year: Surface) -> Column:
+def spun_up(grid: Grid, ground: Ground, year: Above) -> Column:
     """A column in balance with a year that repeats."""
-    column = Column(grid, ground, year.temperature.mean() + 2.0, year.organic[0])
+    column = Column(grid, ground, year.temperature.mean() + 2.0)
     for _ in range(LONGEST_SPIN_UP_YEARS):
         before = column.heat.sum()
         column.run(year)

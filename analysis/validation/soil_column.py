@@ -3,7 +3,7 @@ beside others, and its boundary at other depths.
 
     python analysis/validation/soil_column.py
 
-Stands of several sites live under three policies. In every step each scheme below sees the surface that the
+Stands of several sites live under three policies. In every step each scheme below sees the organic layer that the
 simulator's soil sees, and conducts heat down to the boundary with the simulator's freezing curve, conductivities and
 capacities, after a spin-up of its own: what differs between schemes is discretisation. Steps and boundary depths are
 compared by running the simulator, on the same weather. Thaw returns here are sums of the reward before its clip.
@@ -19,12 +19,12 @@ import pandas as pd
 
 import boreal_env
 import sim
-from analysis.validation.conduction import Column, Grid, Ground, Surface, layer_mean, spun_up, thawed_depth
+from analysis.validation.conduction import Above, Column, Grid, Ground, layer_mean, spun_up, thawed_depth
 from analysis.validation.surface import RecordedStands
 from cleanrl_style import protocol
 from sim.parameters import CONSTANTS
 from sim.stands import available_cores
-from sim.state import DAILY_NAMES, DAYS, PARAMETER_NAMES, STATE_NAMES
+from sim.state import PARAMETER_NAMES
 
 POLICIES = {"zero change": 12, "+100 conifers": 24, "+100 deciduous": 20}
 NO_POLICY = "zero change"  # what the others' effects are differences from
@@ -72,7 +72,6 @@ SURFACE_DEPTH, DEEP_NODE, BOUNDARY = (
 SCHEMES = {
     "30 layers": Grid(LAYER_EDGES_M),
     "15 layers": Grid(LAYER_EDGES_M[::2]),
-    "30 layers, organic layer stores heat": Grid(LAYER_EDGES_M, organic_layers=4),
     "two nodes: the simulator's": Grid((0.0, SURFACE_DEPTH, BOUNDARY), (0.5 * SURFACE_DEPTH, DEEP_NODE), closures=True),
     "two nodes: 0-0.5 m, 0.5-5 m": Grid((0.0, 0.5, 5.0)),
     "two nodes: 0-0.9 m, node at 3 m": Grid((0.0, 0.9, BOUNDARY), (0.45, 3.0)),
@@ -137,10 +136,10 @@ def simulate(args: Args, **options) -> pd.DataFrame:
     return record_means([stands.step(actions) for _ in range(args.years)], names)
 
 
-def run_year(column: Column, surface: Surface) -> tuple[float, float, float, np.ndarray]:
-    """Heat into the boundary and out of it [MJ m-2], deepest thaw [m], and mean temperatures [degC], (layers,)."""
-    daily, (_, warming, cooling) = column.run(surface)
-    thawed = surface.organic + thawed_depth(daily, column.grid.depths)
+def run_year(column: Column, above: Above) -> tuple[float, float, float, np.ndarray]:
+    """Heat into the boundary and out of it [MJ m-2], deepest thaw of the soil [m], mean temperatures [degC] (layers,)."""
+    daily, (_, warming, cooling) = column.run(above)
+    thawed = thawed_depth(daily, column.grid.depths)
     return warming, cooling, thawed.max(), daily.mean(axis=0)
 
 
@@ -151,14 +150,13 @@ def run_schemes(args: Args, schemes: dict[str, Grid]) -> tuple[pd.DataFrame, pd.
     """
     stands, names, actions = start(args, RecordedStands)
     grounds = [Ground.of(dict(zip(PARAMETER_NAMES, row, strict=True))) for row in stands.parameters]
-    organic = stands.state[:, STATE_NAMES.index("organic_depth"), None] + np.zeros(DAYS)
     records, years = [], []
     with ThreadPoolExecutor(available_cores()) as pool:
-        surfaces = map(Surface, *stands.climate_year(), organic)
+        surfaces = map(Above, *stands.climate_year())
         columns = list(pool.map(lambda g, s: [spun_up(grid, g, s) for grid in schemes.values()], grounds, surfaces))
         for _ in range(args.years):
-            record, daily = stands.step(actions, daily=True)
-            surfaces = map(Surface, *stands.surface, daily[:, :, DAILY_NAMES.index("organic_layer_m")].copy())
+            record = stands.step(actions)
+            surfaces = map(Above, *stands.surface)
             years.append(list(pool.map(lambda cs, s: [run_year(column, s) for column in cs], columns, surfaces)))
             records.append(record)
     rows = {}

@@ -1,7 +1,7 @@
-"""The surface that a stand's soil sees, step by step: ground temperature and the resistance of its snow.
+"""What lies on a stand's mineral soil, step by step: temperature of the organic layer, and the resistance of its humus.
 
-The simulator puts out daily means. But frost by night and thaw by day do not cancel, for frozen organic matter conducts
-twice as well as thawed: what is to feel the same surface as the simulator's soil has to see every step.
+The simulator puts out daily means. But frost by night and thaw by day do not cancel, for frozen soil conducts better
+than thawed: what is to feel the same as the simulator's soil has to see every step.
 """
 
 import functools
@@ -15,6 +15,7 @@ from sim.day import begin_day
 from sim.forcing import hour_angles, step_weather
 from sim.jit import phase, specialised
 from sim.physical_constants import SECONDS_PER_DAY
+from sim.snow import settle_snow
 from sim.spin_up import climate_draws
 from sim.state import DAYS, DRAWS, daily_dtype
 from sim.step import simulate_step
@@ -26,7 +27,7 @@ NO_CHANGE = 12
 @phase
 def record_year(b, steps_per_day, no_weather, no_daily, surface):
     """`sim.year.simulate_year` under generated weather, which writes `surface`, shape (2, steps, lanes): temperature
-    of the ground [degC] and resistance of the snow [m2 K W-1] at each step's end."""
+    of the organic layer [degC] at each step's start and resistance of its lower half [m2 K W-1]."""
     begin_year(b)
     seconds = SECONDS_PER_DAY / steps_per_day
     hours = hour_angles(steps_per_day)
@@ -37,8 +38,9 @@ def record_year(b, steps_per_day, no_weather, no_daily, surface):
             step_weather(b, t, hours, seconds, no_weather)
             simulate_step(b, seconds)
             for i in range(len(b.s.swe)):
-                surface[0, day * steps_per_day + t, i] = b.s.ground[i]
-                surface[1, day * steps_per_day + t, i] = b.s.swe[i] * b.w.snow_resistance[i]
+                surface[0, day * steps_per_day + t, i] = b.w.organic[i]
+                surface[1, day * steps_per_day + t, i] = 1.0 / b.w.surface_conductance[i] - b.w.upper_soil[i]
+        settle_snow(b, steps_per_day)
         end_day(b, day, steps_per_day, no_daily)
     end_year(b)
 
@@ -52,7 +54,8 @@ def kernel(lanes: int):
 class RecordedStands(sim.Stands):
     """Stands that keep the surface of their last year.
 
-    surface : ground temperature [degC] and resistance of the snow [m2 K W-1] at each step's end, (2, stands, steps).
+    surface : temperature of the organic layer [degC] and resistance of its lower half [m2 K W-1] in each step,
+    (2, stands, steps).
     """
 
     def climate_year(self) -> np.ndarray:

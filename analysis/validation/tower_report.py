@@ -16,7 +16,6 @@ from analysis.validation import (
 from analysis.validation.document import Miss, Part, number, percent
 from analysis.validation.scores import skill
 from analysis.validation.tower_comparison import QUANTITIES
-from sim.parameters import CONSTANTS
 from sim.physical_constants import LATENT_HEAT_FUSION, MJ_PER_DAY, WATER_DENSITY
 from sim.state import DAYS
 

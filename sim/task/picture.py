@@ -329,7 +329,7 @@ def draw_ground(ax, view: View) -> None:
     temperatures = np.array([surface, deep, boundary])
     active = view.last("active_layer_depth_m")
     swe = view.last("peak_swe_mm", s["swe"])
-    snow = swe / p["snow_density_sheltered"]
+    snow = view.last("peak_snow_depth_m", s["swe"] / s["snow_density"])
 
     low, high = min(mean - 4.0, boundary - 3.0, surface - 1.0), max(mean + 4.0, boundary + 2.0, 4.0)
     bottom = height_on_scale(1.04 * depths[-1])
