@@ -29,6 +29,7 @@ from sim.block import LANES
 from sim.closure import TOLERANCES
 from sim.demography import AGES
 from sim.management import LARGEST_DENSITY, LEAST_DENSITY
+from sim.organic import LEAST_DEPTH_M
 from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.physical_constants import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.spin_up import CLASS_NAMES, INITIAL_LIMITS
@@ -290,7 +291,7 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         yield name, r[name], 0.0, np.inf
     yield "snowfall_mm", r["snowfall_mm"], 0.0, r["precipitation_mm"] * rounded
     yield "transpiration_mm", r["transpiration_mm"], 1.0 - rounded, np.inf
-    deepest = (s["organic_depth"] + p["boundary_depth_m"]) * rounded
+    deepest = (np.maximum(s["organic_depth"], LEAST_DEPTH_M) + p["boundary_depth_m"]) * rounded
     yield "active_layer_depth_m", r["active_layer_depth_m"], 0.0, deepest
     planted, thinned = r["planted_stems_ha"] > 0.0, r["thinned_stems_ha"] > 0.0
     least, largest = np.where(thinned, LEAST_DENSITY, 0.0), np.where(planted, LARGEST_DENSITY, np.inf)

@@ -155,7 +155,7 @@ def fill_soil(b, i, vapour, gained) -> float:
     """Water of canopy and soil, with what the soil gained from above; returns what the bucket cannot hold."""
     s = b.s
     s.canopy_rain[i] = max(s.canopy_rain[i] - vapour.wet_canopy, 0.0)
-    water = s.soil_water[i] + gained - vapour.leaves
+    water = max(s.soil_water[i] + gained - vapour.leaves, 0.0)
     excess = runoff(water, b.p.max_water_content_mm[i])
     s.soil_water[i] = water - excess
     return excess

@@ -137,7 +137,7 @@ def simulate(args: Args, **options) -> pd.DataFrame:
 
 
 def run_year(column: Column, above: Above) -> tuple[float, float, float, np.ndarray]:
-    """Heat into the boundary and out of it [MJ m-2], deepest thaw of the soil [m], mean temperatures [degC] (layers,)."""
+    """Heat into the boundary and out of it [MJ m-2], deepest thaw [m], mean temperatures [degC], (layers,)."""
     daily, (_, warming, cooling) = column.run(above)
     thawed = thawed_depth(daily, column.grid.depths)
     return warming, cooling, thawed.max(), daily.mean(axis=0)
