@@ -27,9 +27,10 @@ SNOW_DENSITY = (170.0, 217.0)  # kg m-3: Ikawa et al. 2024 at US-Prr in March 20
 
 LIKELY = {
     "SE-Svb": {
-        "GPP": "no acclimation: the night's minimum limits late summer and autumn (MOD17), where needles lag weeks",
+        "GPP": "derived from net exchange with a respiration that doubles within days of August; no acclimation: "
+        "spring and autumn follow the night's minimum, where needles lag weeks",
         "ecosystem respiration": "soil carbon is assumed; respiration of roots follows the air, not the warm soil",
-        "net exchange": "late summer: needles and soil are in step in the model, apart in the record (partitioning)",
+        "net exchange": "respiration follows the temperature of air and soil alone, the record's changes within days",
         "latent heat": "transpiration follows net radiation and the night's minimum; canopy evaporation in autumn",
         "sensible heat": "the tower's energy balance is open: H + LE is too small in the record",
         "ground heat": "November and December: the soil froze in the model and loses little afterwards; the record "
