@@ -9,6 +9,20 @@ from hypothesis import settings
 from sim import block
 from sim.jit import cache_folder
 
+# Files that train, run a study or a script's process, or need every kernel; `pytest -m quick` leaves them out.
+SLOW = """agents archive backends benchmark claims document_results eupg fronts heuristics hosts make_figures
+make_tables measure_balance mechanisms new_method picture ppo_curriculum ppo_gated protocol resume sensitivity
+signal_to_noise soil_column stand_development stress three_objectives training_gains validate variance"""
+
+
+def pytest_collection_modifyitems(items):
+    """Marks what is quick."""
+    slow = {f"test_{name}" for name in SLOW.split()}
+    for item in items:
+        if item.path.stem not in slow:
+            item.add_marker("quick")
+
+
 settings.register_profile("repeatable", deadline=None, derandomize=True, database=None, max_examples=60)
 settings.load_profile("repeatable")
 
