@@ -1,6 +1,6 @@
 """Runs a script of the project as the command line would, with checkpoints every 512 steps: short runs have some, too.
 
-    python tests/often_saved.py cleanrl_style/ppo_gated.py --seed 1
+python tests/often_saved.py cleanrl_style/ppo_gated.py --seed 1
 """
 
 import sys
