@@ -220,7 +220,7 @@ def test_masks_are_the_rule_with_half_of_what_is_negligible_to_spare():
         {"objectives": (TIMBER,), "harvest_min_class": "old"},
         {"observation_groups": ("age", "climate", "state")},
     ],
-    ids=str,
+    ids=["default", "one-site", "three", "timber", "no-site"],
 )
 def test_an_environments_mask_function_gives_its_masks(arguments):
     ranges = {"density_stems_ha": (0.0, 2200.0), "oldest_age_years": (10.0, 150.0)}

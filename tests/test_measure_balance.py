@@ -3,11 +3,13 @@ import numpy as np
 from analysis.studies import measure_balance
 
 
-def test_the_measured_scale_equalises_the_spreads(capsys):
+def test_the_measured_scale_equalises_the_spreads(capsys, monkeypatch):
     args = measure_balance.Args(sites=2, years=3)
-    sums = measure_balance.play(args)
+    play = measure_balance.play
+    sums = play(args)
     assert sums.shape == (29, 2, 3) and np.isfinite(sums).all()
     change, _, thaw = measure_balance.within_site_spread(sums)
+    monkeypatch.setattr(measure_balance, "play", lambda args, **reward: play(args, **reward) if reward else sums)
     measure_balance.main(args)
     assert f"balanced carbon_scale: {change / thaw:.4f}" in capsys.readouterr().out
 

@@ -14,23 +14,24 @@ from pathlib import Path
 import pytest
 from scripts import ROOT, run_script
 
-TOY = ("--env-id", "resumable_toy:resumable-toy-v0", "--total-timesteps", 6000, "--num-envs", 3, "--eval-episodes", 2)
-BOREAL_ASYNC = ("--total-timesteps", 2800, "--num-envs", 4, "--eval-episodes", 1)
-BOREAL = ("--total-timesteps", 3200, "--num-envs", 16, "--eval-episodes", 1, "--vectorization", "lockstep")
+TOY = ("--env-id", "resumable_toy:resumable-toy-v0", "--total-timesteps", 1500, "--num-envs", 3, "--eval-episodes", 2)
+BOREAL_ASYNC = ("--total-timesteps", 1000, "--num-envs", 4, "--eval-episodes", 1)
+BOREAL = ("--total-timesteps", 1600, "--num-envs", 16, "--eval-episodes", 1, "--vectorization", "lockstep")
 IMPORT_SECONDS = 3
 
 
 def arguments(script, common):
-    rollout = {TOY: 600, BOREAL_ASYNC: 400, BOREAL: 800}[common]
+    rollout = {TOY: 150, BOREAL_ASYNC: 200, BOREAL: 400}[common]
     ppo = ("--rollout-steps", rollout, "--update-epochs", 2) if "ppo" in script else ()
     weights = ("--eval-weights", 0, 1) if script != "eupg_fixed_lambda" else ()
     return (*common, *ppo, *weights)
 
 
 def start(script, folder, *arguments, **environment):
-    """The script in a process group of its own, as from a terminal."""
+    """The script in a process group of its own, as from a terminal, but with checkpoints every 512 steps."""
     path = os.pathsep.join([str(ROOT), str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")])
-    command = [sys.executable, ROOT / "cleanrl_style" / f"{script}.py", "--run-dir", folder, *arguments]
+    saved = [ROOT / "tests" / "often_saved.py", f"cleanrl_style/{script}.py"]
+    command = [sys.executable, *saved, "--run-dir", folder, *arguments]
     limit = environment.pop("file_size", None)
     return subprocess.Popen(
         [str(part) for part in command],
@@ -135,7 +136,7 @@ def test_killed_and_resumed_is_as_never_killed(script, common, moments, tmp_path
 def interrupted(tmp_path_factory):
     """A run that Ctrl-C stopped, and what it said."""
     folder = tmp_path_factory.mktemp("runs") / "interrupted"
-    process = start("ppo_gated", folder, *arguments("ppo_gated", TOY))
+    process = start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_SECONDS="0.01")
     while process.poll() is None and not (folder / "checkpoint.pt").exists():
         time.sleep(0.005)
     os.killpg(process.pid, signal.SIGINT)
@@ -145,7 +146,7 @@ def interrupted(tmp_path_factory):
 def test_ctrl_c_says_how_to_go_on(interrupted):
     folder, code, _, err = interrupted
     assert code == 130
-    assert err.strip().splitlines() == [f"{folder}: interrupted; the same command goes on from step 2,400"]
+    assert err.strip().splitlines() == [f"{folder}: interrupted; the same command goes on from step 600"]
     assert (folder / "checkpoint.pt").exists() and not (folder / "evaluation.csv").exists()
 
 
@@ -205,7 +206,7 @@ def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, t
         resume(folder)
     os.killpg(first.pid, signal.SIGINT)
     code, out, err = finish(first)
-    assert code == 130 and "resuming at step 2,400" in out
+    assert code == 130 and "resuming at step 600" in out
     assert "was begun with numpy 1.0 there" in err and "Traceback" not in err
 
 
@@ -235,7 +236,7 @@ def test_an_error_in_a_worker_is_shown_and_ends_the_run(interrupted, tmp_path, w
     assert error in err and "error in environment 0" in err
     last = err.strip().splitlines()[-1]
     assert last.startswith("error: environment 0 was ended by its error above")
-    assert last.endswith("the same command goes on from step 2,400")
+    assert last.endswith("the same command goes on from step 600")
     assert (folder / "checkpoint.pt").read_bytes() == old
 
 
@@ -252,7 +253,7 @@ def test_a_killed_worker_ends_the_run(interrupted, tmp_path):
     os.kill(children(process)[1], signal.SIGKILL)
     code, _, err = finish(process)
     assert code == 1
-    assert err.strip() == "error: environment 1 was ended by signal 9; the same command goes on from step 2,400"
+    assert err.strip() == "error: environment 1 was ended by signal 9; the same command goes on from step 600"
 
 
 def test_an_environment_without_a_state_starts_over(tmp_path, capsys):

@@ -286,9 +286,10 @@ CONFLICTS = (
         "stem density",
         "More stems store carbon and cost permafrost.",
         opposed,
-        "Trees protect here by catching snow, which thins what insulates the ground in winter: without "
-        "interception denser stands cost thaw return, though they shade as much. How much is caught, and "
-        "how much the stand shelters its ground, wind decides. Where nothing burns they store carbon.",
+        "Trees protect in this model by catching snow, which thins what insulates the ground in winter: without "
+        "interception denser stands cost thaw return, though they shade as much. The effect turns with the "
+        "constant wind that a site is given, and in calm air with details of the model as well (see where the "
+        "objectives conflict, in `docs/model.md`). Where nothing burns they store carbon.",
         "planting, none",
         "in wind",
     ),

@@ -173,8 +173,7 @@ def gain(evidence, script: str):
     "Table 2",
     MAIN,
     why="Stands start sparse. What is planted takes up carbon and thins the snow, and the penalty of a full stand "
-    "comes late, if at all. Both objectives gain at most sites; where wind is weak planting costs thaw return "
-    "(see the claim on more stems).",
+    "comes late, if at all. Both objectives gain at most sites (see the claim on more stems).",
 )
 def planting_is_worst(evidence):
     papers = published("plus_100").scalarized_mean - published("zero_change").scalarized_mean

@@ -156,8 +156,7 @@ def gain(evidence, script: str, objective: str) -> pd.Series:
     "PPO Gated farms carbon and fails to protect permafrost.",
     "Section 4.4; table of learned strategies",
     MAIN,
-    why="Planting gains in both objectives on average here: most sites have wind enough to thin what snow trees "
-    "catch (see the claim on more stems).",
+    why="Planting gains in both objectives on average here (see the claim on more stems).",
 )
 def gated_fails_permafrost(evidence):
     carbon, thaw = (seeds(gain(evidence, GATED, f"{name}_return")) for name in ("carbon", "thaw"))

@@ -26,9 +26,10 @@ SNOW_DENSITY = (170.0, 217.0)  # kg m-3: Ikawa et al. 2024 at US-Prr in March 20
 
 LIKELY = {
     "SE-Svb": {
-        "GPP": "no acclimation: the night's minimum limits late summer and autumn (MOD17), where needles lag weeks",
+        "GPP": "derived from net exchange with a respiration that doubles within days of August; no acclimation: "
+        "spring and autumn follow the night's minimum, where needles lag weeks",
         "ecosystem respiration": "soil carbon is assumed; respiration of roots follows the air, not the warm soil",
-        "net exchange": "late summer: needles and soil are in step in the model, apart in the record (partitioning)",
+        "net exchange": "respiration follows the temperature of air and soil alone, the record's changes within days",
         "latent heat": "transpiration follows net radiation and the night's minimum; canopy evaporation in autumn",
         "sensible heat": "the tower's energy balance is open: H + LE is too small in the record",
         "ground heat": "November and December: the soil froze in the model and loses little afterwards; the record "
@@ -124,16 +125,17 @@ def report(repeats: int) -> Part:
     return Part(f"{_INTRODUCTION}\n\n{svb_text}\n\n{prr_text}", figures, [*misses, *svb_misses, *prr_misses])
 
 
-_INTRODUCTION = f"""The simulator takes the tower's weather instead of its own. Means are of days on which at least
-{percent(tower_comparison.MEASURED_SHARE)} of the quantity was measured, months of at least
-{tower_comparison.FEWEST_DAYS} such days; bias is modelled less measured, n the number of months or days. A quantity
-misses if the bias of its months exceeds 20 % of their mean magnitude,
-{QUANTITIES["soil temperature"].tolerance:g} degC (or their RMSE {QUANTITIES["soil temperature"].largest_rmse:g}),
-{QUANTITIES["albedo"].tolerance:g} of albedo, or, for the day that
-snow is gone, {tower_comparison.DAYS_OF_SNOW_OFF:g} days. The worst month has the largest gap. The stands are
-those of inventories (`analysis/validation/tower_stands.py` has every value with its source). Of the simulator's
-constants one was calibrated on fluxes of these towers, the Priestley-Taylor coefficient of conifers (LE/(LE + H) of
-June to August at SE-Svb, even days only; part 3); those of the weather generator are not in play here."""
+_INTRODUCTION = f"""The simulator takes the tower's weather instead of its own, and a stand from inventories
+(`analysis/validation/tower_stands.py` has every value with its source). One constant was calibrated on fluxes of these
+towers: the Priestley-Taylor coefficient of conifers (LE/(LE + H) of June to August at SE-Svb, even days only; part 3).
+Those of the weather generator are not in play here.
+
+A quantity misses if the bias of its months (modelled less measured) exceeds 20 % of their mean magnitude; for
+temperature, {QUANTITIES["soil temperature"].tolerance:g} degC (or their RMSE
+{QUANTITIES["soil temperature"].largest_rmse:g}); for albedo, {QUANTITIES["albedo"].tolerance:g}; for the day that snow
+is gone, {tower_comparison.DAYS_OF_SNOW_OFF:g} days. Only days count on which at least
+{percent(tower_comparison.MEASURED_SHARE)} of the quantity was measured, and months of at least
+{tower_comparison.FEWEST_DAYS} such days; n is the number of months or days. The worst month has the largest gap."""
 
 
 def _misses(comparison: Comparison) -> list[Miss]:
@@ -156,17 +158,20 @@ def _svartberget_text(comparison: Comparison) -> tuple[str, list[Miss]]:
     counts = comparison.fluxes["soil_temperature_c_measured"] >= tower_comparison.MEASURED_SHARE
     text = f"""### SE-Svb, Svartberget, 2019
 
-Pine and spruce in northern Sweden, 64.3 N, no permafrost; half-hourly weather. The tower's energy balance is open:
-(H + LE)/(Rn − G) is {number(min(closed))}-{number(max(closed))} in June to August, and over the {days} days of the
-year with all four Rn − G exceeds H + LE by {number(offset, 0)} W m⁻² on average, so a model that closes has to exceed
-the latent or the sensible heat. LE/(LE + H) of June to August does not depend on that: measured {number(measured)},
-modelled {number(modelled)}. Of the bias of ground heat, November and December make
-{number(gap[[11, 12]].sum(), 1, sign=True)} W m⁻²: the soil froze in the model in November. The record loses
-{number(lost, 0)} MJ m⁻² in the year, a mean of {number(lost / DAYS / MJ_PER_DAY, 1)} W m⁻². Soil was
+Pine and spruce in northern Sweden, 64.3 N, no permafrost; half-hourly weather.
+
+**Energy.** The tower's balance is open: (H + LE)/(Rn − G) is {number(min(closed))}-{number(max(closed))} in June to
+August, and over the {days} days of the year with all four Rn − G exceeds H + LE by {number(offset, 0)} W m⁻² on
+average. A model that closes has to exceed the latent or the sensible heat. LE/(LE + H) of June to August does not
+depend on that: measured {number(measured)}, modelled {number(modelled)}.
+
+**Ground.** November and December make {number(gap[[11, 12]].sum(), 1, sign=True)} W m⁻² of the bias of ground heat. The
+record loses {number(lost, 0)} MJ m⁻² in the year, a mean of {number(lost / DAYS / MJ_PER_DAY, 1)} W m⁻². Soil was
 measured at 5 cm; the model's is the top of the mineral soil. From
-{counts[counts].index[-1] + pd.Timedelta(days=1):%-d %B} on its record is filled with one value and not compared. The
-record's respiration doubles within days in early August and halves in mid-September, while the soil's temperature does
-neither; GPP, which is derived from it, follows. Net exchange is what was measured.
+{counts[counts].index[-1] + pd.Timedelta(days=1):%-d %B} on its record is filled with one value and not compared.
+
+**Carbon.** What was measured is net exchange. The record's respiration doubles within days in early August and halves
+in mid-September, while the soil's temperature does neither; GPP, which is derived from it, follows.
 
 {tower_comparison.skill_table(pairs, UNJUDGED["SE-Svb"])}
 
