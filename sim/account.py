@@ -4,9 +4,9 @@ import math
 
 from sim.demography import class_ages, count_classes, count_stand
 from sim.jit import compiled, phase
+from sim.permafrost import note_thaw
 from sim.physical_constants import DAYS_PER_YEAR, LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.snow import SNOW_DAY_MM
-from sim.soil import active_layer
 from sim.weather import december_to_march, season
 
 GROWING_SEASON_C = 5.0
@@ -232,4 +232,4 @@ def write_record(b, i):
     r.summer_albedo[i] = w.summer_up[i] / w.summer_down[i] if w.summer_down[i] > 0.0 else math.nan
     r.winter_albedo[i] = w.winter_up[i] / w.winter_down[i] if w.winter_down[i] > 0.0 else math.nan
     r.organic_layer_m[i] = s.organic_depth[i]
-    r.active_layer_depth_m[i] = active_layer(b, i)
+    note_thaw(b, i)

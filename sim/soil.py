@@ -5,8 +5,6 @@ the bucket of `sim.water`. Where several functions divide by the freezing range,
 compiler makes one division of them all.
 """
 
-import math
-
 from sim.jit import compiled
 from sim.physical_constants import FREEZING_POINT_K, LATENT_HEAT_FUSION, WATER_DENSITY
 
@@ -90,42 +88,6 @@ def organic_layer(depth, conifer, deciduous, depth_conifer, depth_deciduous, dep
 
 
 @compiled
-def thaw_depth(
-    organic,
-    warmth,
-    seconds,
-    deep,
-    boundary,
-    deep_node,
-    boundary_depth,
-    thawed_conductivity,
-    frozen_conductivity,
-    organic_conductivity,
-    thawed_capacity,
-    frozen_capacity,
-    latent,
-):
-    """Active-layer depth [m], from the organic surface; down to the permafrost where that lies below the deep node.
-
-    Stefan's: what a season's warmth at the ground [K s], `seconds` long, conducts through organic layer and thawed soil
-    melts the water [latent, J m-3], warms thawed soil to half the mean temperature of its top, and goes on into soil
-    as cold as the deep node in the year's mean (Carslaw and Jaeger 1959, 2.4: 2 dT sqrt(k C t / pi)).
-    Capacities in J m-3 K-1.
-    """
-    if deep > 0.0:
-        share = deep / (deep - boundary) if boundary < 0.0 else 1.0
-        return organic + deep_node + share * (boundary_depth - deep_node)
-    top = 0.5 * warmth / seconds if seconds > 0.0 else 0.0
-    heat = latent + 0.5 * thawed_capacity * top
-    cold = -2.0 * deep * math.sqrt(frozen_conductivity * frozen_capacity * seconds / math.pi)
-    above = organic * thawed_conductivity / organic_conductivity
-    linear = above * heat + 0.5 * cold
-    square = linear * linear + 2.0 * heat * (thawed_conductivity * warmth - above * cold)
-    front = (math.sqrt(max(square, 0.0)) - linear) / heat if heat > 0.0 else 0.0
-    return organic + min(max(front, 0.0), boundary_depth)
-
-
-@compiled
 def soil_nodes(b, i):
     """Capacities and distances of the two nodes, for the year."""
     p, w = b.p, b.w
@@ -190,26 +152,4 @@ def renew_organic_layer(b, i):
         p.organic_depth_open_m[i],
         p.organic_growth_m_yr[i],
         p.organic_loss_years[i],
-    )
-
-
-@compiled
-def active_layer(b, i) -> float:
-    """Active-layer depth of the year [m], from its warmth and its mean deep temperature."""
-    s, p, w, r = b.s, b.p, b.w, b.r
-    thawed = p.soil_heat_capacity_thawed[i]
-    return thaw_depth(
-        s.organic_depth[i] * p.moss[i],
-        w.thaw_warmth[i],
-        w.thaw_seconds[i],
-        r.deep_soil_temperature_c[i],
-        boundary_temperature(b, i),
-        p.deep_soil_node_m[i],
-        p.boundary_depth_m[i],
-        p.soil_conductivity[i],
-        p.soil_conductivity[i] * w.frozen_ratio[i],
-        p.organic_conductivity_thawed[i],
-        thawed,
-        where_it_freezes(p.soil_freezing[i], thawed, p.soil_heat_capacity_frozen[i]),
-        w.surface_latent[i] / p.surface_soil_depth_m[i],
     )

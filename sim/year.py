@@ -12,6 +12,7 @@ from sim.forcing import hour_angles, site_angles, step_weather
 from sim.interception import unloading_rates
 from sim.jit import phase
 from sim.management import manage
+from sim.permafrost import add_upper_ground
 from sim.photosynthesis import dryness_slopes
 from sim.physical_constants import SECONDS_PER_DAY
 from sim.soil import renew_organic_layer, soil_nodes
@@ -45,6 +46,7 @@ def simulate_year(block, steps_per_day, days, observed, daily):
             step_weather(b, t, hours, seconds, today)
             simulate_step(b, seconds)
         end_day(b, day, steps_per_day, daily)
+        add_upper_ground(b)
     end_year(b)
 
 
