@@ -16,7 +16,8 @@ from sim.parameters import SITE_PARAMETERS, check_mapping
 from sim.physical_constants import FREEZING_POINT_K
 from sim.state import DAYS, STATE
 
-enthalpy, node_capacities = uncompiled(soil.enthalpy), uncompiled(soil.node_capacities)
+enthalpy, temperature = uncompiled(soil.enthalpy), uncompiled(soil.temperature)
+node_capacities = uncompiled(soil.node_capacities)
 
 SPIN_UP_YEARS = 8
 SPIN_UP_STEPS_PER_DAY = 12
@@ -173,7 +174,8 @@ def climate_draws(as_observed: bool = False, persistence: float = 0.0) -> dict[s
 
     The paper's weather has no noise and the mean amount on each wet day. Weather as observed swings by several degrees,
     and what snow, wind and frost make of that is not what they make of the mean: its days have all amounts and winds,
-    spread evenly, and its temperature is a wave of the noise's variance and `persistence` from day to day.
+    spread evenly, and its temperature is a wave of the noise's variance and about its `persistence` from day to day,
+    with as many whole waves in each season.
     """
     day = np.arange(DAYS)
     draws = {
@@ -184,12 +186,13 @@ def climate_draws(as_observed: bool = False, persistence: float = 0.0) -> dict[s
         "mortality_dice": np.full(1, 0.5),
     }
     if as_observed:
-        wave = math.sqrt(2.0) * np.cos(math.acos(persistence) * np.arange(-1, DAYS))
+        waves = 4 * max(1, round(math.acos(persistence) * DAYS / (8.0 * math.pi)))
+        wave = math.sqrt(2.0) * np.cos(2.0 * math.pi * waves / DAYS * np.arange(-1, DAYS))
         noise = (wave[1:] - persistence * wave[:-1]) / math.sqrt(1.0 - persistence**2)
         noise[0] = wave[1]  # nothing is remembered on 1 January
-        draws["temperature_noise"] = noise
-        draws["wet_amount"] = -np.log(1.0 - (0.5 + day * math.sqrt(2.0)) % 1.0)
         normal = NormalDist()
+        draws["temperature_noise"] = noise
+        draws["wet_amount"] = -np.log(1.0 - (0.5 + day * 2.0 ** (1.0 / 3.0)) % 1.0)
         draws["wind_noise"] = np.array([normal.inv_cdf(share) for share in (0.5 + day * math.sqrt(3.0)) % 1.0])
     return draws
 
@@ -203,10 +206,15 @@ def deep_heat_limits(parameters: dict, surface_temperature: float) -> tuple[floa
     return enthalpy(low - SEASONAL_RANGE_K, *node), enthalpy(high + SEASONAL_RANGE_K, *node)
 
 
-def boundary_in_balance(deep_temperature: np.ndarray) -> np.ndarray:
-    """Boundary [K] through which no heat flows in the mean, from the deep soil's mean temperature [degC]."""
+def boundary_in_balance(parameters: dict, mean: float, heat: float, next_heat: float) -> float:
+    """Boundary [K] through which no heat flows in the year to come: as warm as the deep soil will be in its mean.
+
+    mean : of the year just run [degC], in which its enthalpy [J m-2] was `heat`; next_heat : where it starts now.
+    """
+    node = soil_node(parameters, "deep")
+    expected = mean + temperature(next_heat, *node) - temperature(heat, *node)
     limits = SITE_PARAMETERS[BOUNDARY]
-    return np.clip(deep_temperature + FREEZING_POINT_K, limits.physical_low, limits.physical_high)
+    return min(max(expected + FREEZING_POINT_K, limits.physical_low), limits.physical_high)
 
 
 def soil_carbon_in_balance(soil, change, respired) -> np.ndarray:

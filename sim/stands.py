@@ -166,15 +166,14 @@ class Stands:
             self._check(stands, state, record, "spin-up")
             state[:, held] = first[:, held]
             gain = state[:, deep] - heat
-            if self.boundary == "balanced":
-                self.parameters[stands, boundary] = boundary_in_balance(record[:, deep_mean])
             if year > 0:  # the first year only lays the snow
-                limits = [
-                    deep_heat_limits(dict(zip(PARAMETER_NAMES, self.parameters[stand], strict=True)), temperature)
-                    for stand, temperature in zip(stands, record[:, surface], strict=True)
-                ]
+                sites = [dict(zip(PARAMETER_NAMES, self.parameters[stand], strict=True)) for stand in stands]
+                limits = [deep_heat_limits(*pair) for pair in zip(sites, record[:, surface], strict=True)]
                 state[:, deep] = next_deep_heat(heat, gain, heat_before, gain_before, np.array(limits))
                 heat_before, gain_before = heat, gain
+                if self.boundary == "balanced":
+                    years = zip(sites, record[:, deep_mean], heat + 0.5 * gain, state[:, deep], strict=True)
+                    self.parameters[stands, boundary] = [boundary_in_balance(*each) for each in years]
             self.state[stands] = state
         return record
 
