@@ -26,6 +26,9 @@ from sim.task.observation import Moment, Table, observation_rows
 from sim.task.preference import check_weights, draw_weights, shown
 
 MODES = ("generalist", "site_specific")
+
+#: The world of `boreal-balanced-v0`, as arguments of an environment or of `sim.Stands`.
+BALANCED_WORLD = {"boundary": "balanced", "soil_carbon": "balanced", "weather": "observed"}
 DEFAULT_YEARS = 50
 
 
