@@ -4,6 +4,7 @@ import importlib
 import math
 import re
 from pathlib import Path
+from statistics import NormalDist
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,6 +21,7 @@ import sim.disturbance
 import sim.interception
 import sim.management
 import sim.mathematics
+import sim.permafrost
 import sim.photosynthesis
 import sim.radiation
 import sim.response
@@ -41,7 +43,7 @@ def plain(module):
 canopy, carbon, demography, disturbance = map(plain, (sim.canopy, sim.carbon, sim.demography, sim.disturbance))
 interception, management, mathematics = map(plain, (sim.interception, sim.management, sim.mathematics))
 photosynthesis, radiation, response = map(plain, (sim.photosynthesis, sim.radiation, sim.response))
-snow, soil, structure = map(plain, (sim.snow, sim.soil, sim.structure))
+permafrost, snow, soil, structure = map(plain, (sim.permafrost, sim.snow, sim.soil, sim.structure))
 water, weather, wind = map(plain, (sim.water, sim.weather, sim.wind))
 
 share = st.floats(0.0, 1.0)
@@ -155,9 +157,27 @@ def test_precipitation_season(day, celsius, kind):
 
 
 def test_daily_precipitation():
-    assert weather.daily_precipitation(0.2, 1.0, 0.2, 10.0, 0.1, 0.0) == 0.0
-    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, 0.0) == approx(5.0)
-    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, -10.0) == approx(5.0 / math.e)
+    assert weather.daily_precipitation(0.2, 1.0, 0.2, 10.0, 0.1, 0.0, 0.0) == 0.0
+    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, 0.0, 0.0) == approx(5.0)
+    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, -10.0, 0.0) == approx(5.0 / math.e)
+    # Large anomalies: in a straight line, from none to twice as much, about what the season gives.
+    for swing, factor in ((-20.0, 0.0), (-5.0, 0.5), (0.0, 1.0), (5.0, 1.5), (20.0, 2.0)):
+        amount = weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, swing - 10.0, swing)
+        assert amount == approx(5.0 / math.e * factor)
+
+
+def test_oftener_wet_but_never_oftener_than_every_day():
+    assert weather.wet_day_factor(0.1, 3.0) == 3.0
+    assert weather.wet_day_factor(0.5, 3.0) == approx(2.0)
+    assert weather.wet_day_factor(0.0, 3.0) == 3.0
+
+
+def test_a_varying_wind_keeps_its_mean():
+    shares = (np.arange(2000) + 0.5) / 2000
+    speeds = np.array([wind.daily_wind(3.0, 0.38, NormalDist().inv_cdf(share)) for share in shares])
+    assert speeds.mean() == approx(3.0, rel=1e-3)
+    assert speeds.std() / speeds.mean() == approx(math.sqrt(math.exp(0.38**2) - 1.0), rel=0.01)
+    assert wind.daily_wind(3.0, 0.0, 1.7) == 3.0
 
 
 def test_rain_damps_the_diurnal_range():
@@ -359,18 +379,26 @@ def test_thaw_depth_of_stefan():
     latent, warmth, days = 86.8e6, 8.0 * 86400.0 * 120, 86400.0 * 120
     rest = (-3.0, 2.5, 12.0, 1.2, 1.7, 0.2)  # boundary, deep node, boundary's depth, conductivities
     # Without moss, cold soil or heat capacity: sqrt(2 k T t / L).
-    assert soil.thaw_depth(0.0, warmth, days, 0.0, *rest, 0.0, 0.0, latent) == approx(
+    assert permafrost.thaw_depth(0.0, warmth, days, 0.0, *rest, 0.0, 0.0, latent) == approx(
         math.sqrt(2.4 * warmth / latent), rel=1e-12
     )
     # What goes in is what melts, warms and goes on: k T t = (above + X / 2) (heat X + cold).
-    depth = soil.thaw_depth(0.1, warmth, days, -2.0, *rest, 2.3e6, 1.7e6, latent) - 0.1
+    depth = permafrost.thaw_depth(0.1, warmth, days, -2.0, *rest, 2.3e6, 1.7e6, latent) - 0.1
     heat, cold = latent + 2.3e6 * 2.0, 4.0 * math.sqrt(1.7 * 1.7e6 * days / math.pi)
     assert (0.1 * 1.2 / 0.2 + 0.5 * depth) * (heat * depth + cold) == approx(1.2 * warmth, rel=1e-12)
     assert 0.8 < depth < 1.0
-    assert soil.thaw_depth(0.1, 0.0, 0.0, -2.0, *rest, 2.3e6, 1.7e6, latent) == 0.1
+    assert permafrost.thaw_depth(0.1, 0.0, 0.0, -2.0, *rest, 2.3e6, 1.7e6, latent) == 0.1
     # A deep node that is thawed: permafrost begins on the line from it to the boundary.
-    assert soil.thaw_depth(0.1, warmth, days, 1.0, *rest, 2.3e6, 1.7e6, latent) == approx(0.1 + 2.5 + 9.5 / 4.0)
-    assert soil.thaw_depth(0.1, warmth, days, 1.0, 2.0, *rest[1:], 2.3e6, 1.7e6, latent) == approx(12.1)
+    assert permafrost.thaw_depth(0.1, warmth, days, 1.0, *rest, 2.3e6, 1.7e6, latent) == approx(0.1 + 2.5 + 9.5 / 4.0)
+    assert permafrost.thaw_depth(0.1, warmth, days, 1.0, 2.0, *rest[1:], 2.3e6, 1.7e6, latent) == approx(12.1)
+
+
+def test_upper_ground_by_hand():
+    assert permafrost.upper_temperature(-1.0, -4.0, 1.0) == approx(-3.0)
+    profile = (2.0, -1.0, -4.0, -2.0, 1.0, 2.5, 12.0)  # top, surface, deep, boundary; their depths
+    for depth, expected in ((-0.1, 2.0), (0.0, 2.0), (0.25, 0.5), (0.5, -1.0), (1.5, -2.5), (2.5, -4.0), (7.25, -3.0)):
+        assert permafrost.temperature_at(depth, *profile) == approx(expected)
+    assert permafrost.temperature_at(12.0, *profile) == permafrost.temperature_at(40.0, *profile) == approx(-2.0)
 
 
 def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():
