@@ -187,8 +187,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `boundary`: "sampled" with the site, or "balanced" (`boreal-balanced-v0`): the temperature far below is the one
       at which no heat flows there under the site's own first stand, found by the spin-up, whatever the site's own.
       The observation shows it, and it may leave the sampled range of 268-272 K
-    - `soil_carbon`: first soil carbon "drawn", or "balanced" (`boreal-balanced-v0`): what the first stand's litter keeps
-      up, at least 2 kgC/m2; as drawn without trees
+    - `soil_carbon`: first soil carbon "drawn", or "balanced" (`boreal-balanced-v0`): what the first stand's litter
+      keeps up, at least 2 kgC/m2; as drawn without trees
     - `weather`: "paper", or "observed" (`boreal-balanced-v0`): temperature, wet days and wind vary from day to day as
       on record, and means stay
     - `objectives`: of the reward vector, "carbon", "thaw", "active_layer", "permafrost_heat" and any `Objective` of

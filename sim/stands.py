@@ -155,7 +155,9 @@ class Stands:
         deep, surface = STATE_NAMES.index("deep_heat"), RECORD_NAMES.index("surface_soil_temperature_c")
         deep_mean, boundary = RECORD_NAMES.index("deep_soil_temperature_c"), PARAMETER_NAMES.index(BOUNDARY)
         draws = np.zeros((len(stands), DRAWS_SIZE))
-        for name, values in climate_draws(self.weather["weather_as_observed"], self.constants["temperature_persistence"]).items():
+        for name, values in climate_draws(
+            self.weather["weather_as_observed"], self.constants["temperature_persistence"]
+        ).items():
             draws[:, draw_slice(name)] = values
         nothing = np.full(len(stands), 12)
         steps = self.steps_per_day if observed is not None else min(self.steps_per_day, SPIN_UP_STEPS_PER_DAY)

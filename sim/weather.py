@@ -114,8 +114,8 @@ def daily_precipitation(dice, amount, probability, mean, sensitivity, departure,
     departure : degrees of a rainy day from its season's base temperature (convection), of a snow day from the
     climate's mean for the date. Beyond 2.7 times (15 degC at 0.07 per degree) rain grows no more: air that warm is
     outside the records that the sensitivity is from.
-    swing : the part of the departure that is the day's anomaly, where anomalies are as large as on record: precipitation
-    is linear in it, up to none and twice as much, so that the mean stays.
+    swing : the part of the departure that is the day's anomaly, where anomalies are as large as on record:
+    precipitation is linear in it, up to none and twice as much, so that the mean stays.
     """
     growth = exponential(min(sensitivity * (departure - swing), LARGEST_RAIN_GROWTH))
     growth *= 1.0 + min(max(sensitivity * swing, -LARGEST_SWING), LARGEST_SWING)

@@ -78,7 +78,7 @@ def ground_exchange(b):
 
 @compiled
 def daily_wind(mean, spread, noise) -> float:
-    """Wind speed of a day [m s-1]: log-normal about the site's mean, from a normal deviate; spread : of the logarithm."""
+    """Wind speed of a day [m s-1]: log-normal about the site's mean, from a normal deviate; spread : of the log."""
     return mean * exponential(spread * (noise - 0.5 * spread))
 
 

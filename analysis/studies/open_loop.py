@@ -59,8 +59,8 @@ def play(sites, seeds, plans, *, initial=None, **arguments) -> Episodes:
     """Play plans: an action where it can be carried out in full, no change elsewhere, as a masked agent would.
 
     sites : for each episode its 62 parameters by name; seeds : for each its `sim.Seeds`; plans : actions, integers
-    (n, years); initial : episode -> first stocks, see `sim.Stands.start`; arguments : of `sim.Stands`, such as constants,
-    mechanisms, weather, boundary, threads. Rewards are the paper's.
+    (n, years); initial : episode -> first stocks, see `sim.Stands.start`; arguments : of `sim.Stands`, such as
+    constants, weather, boundary, threads. Rewards are the paper's.
     """
     plans = np.asarray(plans)
     everyone = np.arange(len(plans))

@@ -13,7 +13,7 @@ UNDISTURBED = {"fire": False, "insects": False}
 
 
 def run_held(sites: list[dict], seeds: list, weather: str = "paper", years: int = YEARS) -> tuple[np.ndarray, ...]:
-    """Temperature of the boundary in balance [K], and mean heat into it [MJ m-2 yr-1] in the first years, (sites,) each.
+    """Temperature of the boundary in balance [K] and mean heat into it [MJ m-2 yr-1] in the first years, (sites,) each.
 
     sites : parameters by name; seeds : of each, which give its first stand and weather.
     """
