@@ -175,10 +175,10 @@ def test_balanced_soil_carbon_keeps_what_it_gets():
     initial = {"conifer_mature_stems_ha": 1500.0, "biomass_kgc_m2": 5.6}
     quiet = {"fire": False, "insects": False}
     drawn, balanced = (
-        simulate(initial=initial, soil_carbon=how, mechanisms=quiet, time_step_minutes=120)
+        simulate(initial=initial, soil_carbon=how, mechanisms=quiet, time_step_minutes=120, years=5).mean()
         for how in ("drawn", "balanced")
     )
-    assert abs(balanced.soil_change_kgc_m2[0]) < 0.1 * balanced.litterfall_kgc_m2[0] < drawn.soil_change_kgc_m2[0]
+    assert abs(balanced.soil_change_kgc_m2) < 0.2 * balanced.litterfall_kgc_m2 < drawn.soil_change_kgc_m2
     given = simulate(initial={**initial, "soil_kgc_m2": 3.0}, soil_carbon="balanced")
     assert given.soil_kgc_m2[0] - given.soil_change_kgc_m2[0] == pytest.approx(3.0)
     treeless = {"density_stems_ha": 0.0}
