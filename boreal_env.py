@@ -21,6 +21,7 @@ from sim.stands import available_cores
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
 from sim.task.checks import check_choice
 from sim.task.episodes import (
+    BALANCED_WORLD,
     DEFAULT_YEARS,
     MODES,
     Episodes,
@@ -30,6 +31,7 @@ from sim.task.episodes import (
 )
 from sim.task.objectives import (
     BALANCED_CARBON_SCALE,
+    FIELD_OBJECTIVES,
     HISTORY_NAMES,
     PAPER_OBJECTIVES,
     REWARD_COLUMNS,
@@ -54,9 +56,11 @@ from sim.task.preference import check_weights, draw_weights, observed_weights, s
 
 __all__ = [
     "BALANCED_CARBON_SCALE",
+    "BALANCED_WORLD",
     "BorealEnv",
     "BorealVectorEnv",
     "DEFAULT_YEARS",
+    "FIELD_OBJECTIVES",
     "HISTORY_NAMES",
     "MODES",
     "MaskFunction",
@@ -145,13 +149,22 @@ class BorealEnv(Described, gym.Env, EzPickle):
 
     ## Reward Space
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, soil and wood products over `carbon_scale`,
-    less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2. Another
-    objective is a function of the year's record: `objectives=("carbon", "thaw", Objective("timber", value, 0, 1))`.
+    less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2. Ready beside
+    them is thaw as the field measures it: "active_layer", 1 - thaw depth / 1 m, and "permafrost_heat",
+    -1 - heat of the upper 3 m / 135 MJ/m2 (1 is frozen through, -1 thawed). Any other objective is a function of the
+    year's record: `objectives=("carbon", "active_layer", Objective("timber", value, 0, 1))`.
     The preference has a weight for each, none negative, 1 in sum; of two it is given as one number, the first's.
 
     ## Starting State
     Site, first stocks and ages, weather and preference are drawn anew in generalist mode, and are fixed in
     site-specific mode (but the preference). Soil, snow and water are spun up.
+
+    ## Which Id
+    `boreal-balanced-v0` is the task to study policies with: the ground below is in balance with the climate and the
+    first stand above it, the soil's carbon with its litter, weather varies from day to day as on record, and both
+    returns vary alike between policies. `boreal-generalist-v0` and `boreal-site-specific-v0` are the paper's: use them
+    to compare with it. There the boundary's temperature is drawn without regard to the climate, and so which site was
+    drawn decides nearly all of the thaw return.
 
     ## Episode Termination
     After 50 years the episode is terminated: nothing is worth anything beyond.
@@ -171,7 +184,15 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `harvest_min_class`: youngest class that may be cut: "young", "mature" or "old"
     - `reward`: a `Reward`, or a dict of the constants to change
     - `balanced`: whether `carbon_scale`, unless `reward` gives it, is 1.4 (`boreal-balanced-v0`) instead of 2
-    - `objectives`: of the reward vector, "carbon", "thaw" and any `Objective` of your own
+    - `boundary`: "sampled" with the site, or "balanced" (`boreal-balanced-v0`): the temperature far below is the one
+      at which no heat flows there under the site's own first stand, found by the spin-up, whatever the site's own.
+      The observation shows it, and it may leave the sampled range of 268-272 K
+    - `soil_carbon`: first soil carbon "drawn", or "balanced" (`boreal-balanced-v0`): what the first stand's litter
+      keeps up, at least 2 kgC/m2; as drawn without trees
+    - `weather`: "paper", or "observed" (`boreal-balanced-v0`): temperature, wet days and wind vary from day to day as
+      on record, and means stay
+    - `objectives`: of the reward vector, "carbon", "thaw", "active_layer", "permafrost_heat" and any `Objective` of
+      your own
     - `mechanisms`: switches of the physics, see `sim.MECHANISMS`
     - `constants`: literature constants to override, see `sim/constants.csv`
     - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`, whose order they keep
@@ -398,7 +419,7 @@ def _spread(name, value, number) -> list:
 REGISTERED: dict[str, dict] = {
     "boreal-generalist-v0": {"mode": "generalist"},
     "boreal-site-specific-v0": {"mode": "site_specific"},
-    "boreal-balanced-v0": {"mode": "generalist", "balanced": True},
+    "boreal-balanced-v0": {"mode": "generalist", "balanced": True, **BALANCED_WORLD},
 }
 for _name, _kwargs in REGISTERED.items():
     gym.register(

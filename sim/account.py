@@ -2,9 +2,9 @@
 
 import math
 
-from sim.active_layer import active_layer
 from sim.demography import class_ages, count_classes, count_stand
 from sim.jit import compiled, phase
+from sim.permafrost import note_thaw
 from sim.physical_constants import DAYS_PER_YEAR, LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.snow import SNOW_DAY_MM, snow_depth
 from sim.weather import december_to_march, season
@@ -243,4 +243,4 @@ def write_record(b, i):
     r.summer_albedo[i] = w.summer_up[i] / w.summer_down[i] if w.summer_down[i] > 0.0 else math.nan
     r.winter_albedo[i] = w.winter_up[i] / w.winter_down[i] if w.winter_down[i] > 0.0 else math.nan
     r.organic_layer_m[i] = s.organic_depth[i]
-    r.active_layer_depth_m[i] = active_layer(b, i)
+    note_thaw(b, i)

@@ -29,5 +29,5 @@ def begin_day(b, day, observed):
     trunk_conductances(b)
     snow_properties(b)
     cold_stress(b)
-    day_wind(b)
+    day_wind(b, day)
     litter(b, day)

@@ -23,8 +23,13 @@ def episode_seeds(seed: int) -> Seeds:
 
 
 def draw_year(weather, disturbance) -> np.ndarray:
-    """A year's random numbers in the order of `sim.state.DRAWS`: always as many, whatever the stand does."""
-    streams = {"weather": weather, "disturbance": disturbance}
+    """A year's random numbers in the order of `sim.state.DRAWS`: always as many, whatever the stand does.
+
+    The wind's are from where the weather's stream would be after 2^127 draws, so that the rest of the weather is the
+    same whether the wind varies or not, and no stream has to be kept for it.
+    """
+    wind = np.random.Generator(weather.bit_generator.jumped())
+    streams = {"weather": weather, "disturbance": disturbance, "wind": wind}
     values = []
     for daily, distribution, stream in DRAWS.values():
         generator = streams[stream]

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from sim.jit import compiled, phase
+from sim.mathematics import between
 from sim.physical_constants import DAYS_PER_YEAR, FREEZING_POINT_K, SECONDS_PER_DAY, SOLAR_CONSTANT
 from sim.radiation import black_body
 from sim.weather import (
@@ -24,6 +25,7 @@ from sim.weather import (
     snow_share,
     solar_declination,
     solar_distance_factor,
+    wet_day_factor,
 )
 from sim.wind import wind_exchange
 
@@ -73,7 +75,15 @@ def generated_weather(b, day):
     cosine, sine = math.cos(angle), math.sin(angle)
     first = day == 0
     for i in range(len(b.s.swe)):
-        spread = p.daily_noise_std_c[i] * d.temperature_noise[day, i]
+        as_observed = p.weather_as_observed[i]
+        larger = of_season(
+            day,
+            p.noise_factor_winter[i],
+            p.noise_factor_spring[i],
+            p.noise_factor_summer[i],
+            p.noise_factor_autumn[i],
+        )
+        spread = p.daily_noise_std_c[i] * between(1.0, larger, as_observed) * d.temperature_noise[day, i]
         memory = p.temperature_persistence[i]
         w.anomaly[i] = spread if first else memory * w.anomaly[i] + math.sqrt(1.0 - memory * memory) * spread
         temperature = daily_mean_temperature(
@@ -114,8 +124,16 @@ def generated_weather(b, day):
         departure = w.anomaly[i] * p.snowfall_limit[i] if winter else temperature - base
         scale = 1.0 + p.snowfall_limit[i] * (p.snowfall_scale[i] - 1.0)
         mean = mean * scale if winter else mean
+        oftener = between(1.0, wet_day_factor(probability, p.wet_day_factor[i]), as_observed)
+        swing = as_observed * w.anomaly[i] * (p.snowfall_limit[i] if winter else 1.0)
         precipitation = daily_precipitation(
-            d.wet_dice[day, i], d.wet_amount[day, i], probability, mean, sensitivity, departure
+            d.wet_dice[day, i],
+            d.wet_amount[day, i],
+            probability * oftener,
+            mean / oftener,
+            sensitivity,
+            departure,
+            swing,
         )
         wet = precipitation >= WET_DAY_MM
 
@@ -135,6 +153,14 @@ def generated_weather(b, day):
             p.clearness_dry_summer[i],
             p.clearness_dry_autumn[i],
         )
+        observed_clearness = of_season(
+            day,
+            p.clearness_observed_dry_winter[i],
+            p.clearness_observed_dry_spring[i],
+            p.clearness_observed_dry_summer[i],
+            p.clearness_observed_dry_autumn[i],
+        )
+        dry_clearness = between(dry_clearness, observed_clearness, as_observed)
         wet_clearness = of_season(
             day,
             p.clearness_wet_winter[i],
@@ -146,6 +172,14 @@ def generated_weather(b, day):
         dry_cloud = of_season(
             day, p.cloud_dry_winter[i], p.cloud_dry_spring[i], p.cloud_dry_summer[i], p.cloud_dry_autumn[i]
         )
+        observed_cloud = of_season(
+            day,
+            p.cloud_dry_winter[i],
+            p.cloud_dry_spring[i],
+            p.cloud_observed_dry_summer[i],
+            p.cloud_observed_dry_autumn[i],
+        )
+        dry_cloud = between(dry_cloud, observed_cloud, as_observed)
         wet_cloud = of_season(day, p.cloud_wet_cold[i], p.cloud_wet_warm[i], p.cloud_wet_warm[i], p.cloud_wet_cold[i])
         w.emissivity[i] = sky_emissivity(temperature, w.vapour[i], wet_cloud if wet else dry_cloud)
         w.top_of_canopy[i] = clearness * w.extraterrestrial[i]

@@ -70,6 +70,10 @@ MECHANISMS = {
     "snowfall_limit": "snowfall of the records, less in cold spells (off: the site table's, 2.4 times as much)",
 }
 
+#: Weather of the generator: as the paper's table has it, or with the daily variability of the records; where the second
+#: is chosen, the parameter `weather_as_observed` is 1.
+WEATHERS = ("paper", "observed")
+
 #: Constants that make sense only in this order.
 ORDERED_CONSTANTS = (
     ("surface_soil_depth_m", "deep_soil_node_m"),
@@ -184,6 +188,18 @@ def check_mechanisms(switches: dict | None) -> dict[str, bool]:
             raise ValueError(f"mechanism {name!r}: True or False is allowed, got {value!r}")
         values[name] = bool(value)
     return values
+
+
+def check_weather(weather: str) -> dict[str, bool]:
+    """One of `WEATHERS`, as the parameter that it is."""
+    return {"weather_as_observed": check_name("weather", weather, WEATHERS) == "observed"}
+
+
+def check_name(what: str, value, allowed: tuple[str, ...]) -> str:
+    """One of the names that are allowed."""
+    if not isinstance(value, str) or value not in allowed:
+        raise ValueError(f"{what} {value!r}: allowed are {', '.join(allowed)}")
+    return value
 
 
 def check_mapping(what: str, mapping) -> dict:

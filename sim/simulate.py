@@ -34,6 +34,9 @@ def simulate(
     output="annual",
     constants=None,
     mechanisms=None,
+    weather="paper",
+    boundary="sampled",
+    soil_carbon="drawn",
     hwp_half_life_years=None,
     harvest_min_class="young",
 ):
@@ -54,7 +57,8 @@ def simulate(
     initial : first stocks by name: density_stems_ha, conifer_fraction, biomass_kgc_m2, soil_kgc_m2, hwp_kgc_m2,
         organic_layer_m, oldest_age_years, or stems by class (conifer_mature_stems_ha, ...); the rest is drawn.
     output : "annual" for one row a year (columns `sim.state.RECORD`), "daily" for one row a day (`sim.state.DAILY`).
-    constants, mechanisms, hwp_half_life_years, harvest_min_class, time_step_minutes, backend : see `sim.Stands`.
+    constants, mechanisms, weather, boundary, soil_carbon, hwp_half_life_years, harvest_min_class, time_step_minutes,
+    backend : see `sim.Stands`.
 
     Returns
     -------
@@ -76,6 +80,9 @@ def simulate(
         backend=backend,
         constants=constants,
         mechanisms=mechanisms,
+        weather=weather,
+        boundary=boundary,
+        soil_carbon=soil_carbon,
         hwp_half_life_years=hwp_half_life_years,
         harvest_min_class=harvest_min_class,
     )

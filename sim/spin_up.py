@@ -5,17 +5,19 @@ held fixed. Deep soil remembers decades, more where it freezes; a secant search 
 """
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 
 from sim import organic, soil
 from sim.demography import AGE_CLASSES, AGES, OLDEST, first_ages
 from sim.jit import uncompiled
-from sim.parameters import check_mapping
+from sim.parameters import SITE_PARAMETERS, check_mapping
 from sim.physical_constants import FREEZING_POINT_K, WATER_DENSITY
 from sim.state import DAYS, STATE
 
-enthalpy, node_capacities = uncompiled(soil.enthalpy), uncompiled(soil.node_capacities)
+enthalpy, temperature = uncompiled(soil.enthalpy), uncompiled(soil.temperature)
+node_capacities = uncompiled(soil.node_capacities)
 layer_capacities = uncompiled(organic.layer_capacities)
 
 SPIN_UP_YEARS = 8
@@ -24,6 +26,14 @@ LONGEST_LEAP = 15.0  # years
 FIRST_SNOW_DENSITY = 200.0  # kg m-3
 SEASONAL_RANGE_K = 4.0
 GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
+
+#: The fixed temperature below: drawn for the site, or the one that the first stand has in balance.
+BOUNDARIES = ("sampled", "balanced")
+BOUNDARY = "deep_boundary_temperature_k"
+
+#: First soil carbon: drawn, or what the litter of the first stand keeps up.
+SOIL_CARBONS = ("drawn", "balanced")
+LEAST_SOIL_KGC = 2.0  # the least that the paper draws: ground that has no trees now had some before
 
 #: Ranges that the first stocks are drawn from.
 INITIAL_RANGES = {
@@ -173,19 +183,62 @@ def organic_node(parameters: dict, depth: float, water: float) -> tuple[float, f
     ), parameters["soil_freezing_range_k"]
 
 
-def climate_draws() -> dict[str, np.ndarray]:
-    """Draws of the climate's mean year: no noise, wet days spread evenly, each with the mean amount; no fire."""
-    evenly = (np.arange(DAYS) * GOLDEN_RATIO) % 1.0
-    return {"wet_dice": evenly, "wet_amount": np.ones(DAYS), "fire_dice": np.ones(DAYS)}
+def climate_draws(as_observed: bool = False, persistence: float = 0.0) -> dict[str, np.ndarray]:
+    """Draws of the climate's mean year: wet days spread evenly, no fire, no insects, the mean mortality.
+
+    The paper's weather has no noise and the mean amount on each wet day. Weather as observed swings by several degrees,
+    and what snow, wind and frost make of that is not what they make of the mean: its days have all amounts and winds,
+    spread evenly, and its temperature is a wave of the noise's variance and about its `persistence` from day to day,
+    with as many whole waves in each season.
+    """
+    day = np.arange(DAYS)
+    draws = {
+        "wet_dice": (day * GOLDEN_RATIO) % 1.0,
+        "wet_amount": np.ones(DAYS),
+        "fire_dice": np.ones(DAYS),
+        "insect_dice": np.ones(1),
+        "mortality_dice": np.full(1, 0.5),
+    }
+    if as_observed:
+        waves = 4 * max(1, round(math.acos(persistence) * DAYS / (8.0 * math.pi)))
+        wave = math.sqrt(2.0) * np.cos(2.0 * math.pi * waves / DAYS * np.arange(-1, DAYS))
+        noise = (wave[1:] - persistence * wave[:-1]) / math.sqrt(1.0 - persistence**2)
+        noise[0] = wave[1]  # nothing is remembered on 1 January
+        normal = NormalDist()
+        draws["temperature_noise"] = noise
+        draws["wet_amount"] = -np.log(1.0 - (0.5 + day * 2.0 ** (1.0 / 3.0)) % 1.0)
+        draws["wind_noise"] = np.array([normal.inv_cdf(share) for share in (0.5 + day * math.sqrt(3.0)) % 1.0])
+    return draws
 
 
 def deep_heat_limits(parameters: dict, surface_temperature: float) -> tuple[float, float]:
     """Range of the deep soil's enthalpy [J m-2] on 1 January: its mean lies between the surface soil's and the
     boundary's, and the season moves it by less than `SEASONAL_RANGE_K` from that."""
-    boundary = parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K
+    boundary = parameters[BOUNDARY] - FREEZING_POINT_K
     low, high = sorted((surface_temperature, boundary))
     node = soil_node(parameters, "deep")
     return enthalpy(low - SEASONAL_RANGE_K, *node), enthalpy(high + SEASONAL_RANGE_K, *node)
+
+
+def boundary_in_balance(parameters: dict, mean: float, heat: float, next_heat: float) -> float:
+    """Boundary [K] through which no heat flows in the year to come: as warm as the deep soil will be in its mean.
+
+    mean : of the year just run [degC], in which its enthalpy [J m-2] was `heat`; next_heat : where it starts now.
+    """
+    node = soil_node(parameters, "deep")
+    expected = mean + temperature(next_heat, *node) - temperature(heat, *node)
+    limits = SITE_PARAMETERS[BOUNDARY]
+    return min(max(expected + FREEZING_POINT_K, limits.physical_low), limits.physical_high)
+
+
+def soil_carbon_in_balance(soil, change, respired) -> np.ndarray:
+    """Soil carbon [kgC m-2] whose respiration is what it gets, for respiration is in proportion to it.
+
+    soil : at the start of the year just run; change : what it gained; respired : what it lost to the air.
+    """
+    rate = respired / (soil + 0.5 * change)
+    limit = INITIAL_LIMITS["soil_kgc_m2"][1]
+    return np.clip((change + respired) / np.maximum(rate, 1e-6), LEAST_SOIL_KGC, limit)
 
 
 def next_deep_heat(heat, gain, heat_before, gain_before, limits) -> np.ndarray:

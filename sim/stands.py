@@ -16,15 +16,20 @@ from sim.closure import check_closure
 from sim.demography import AGES, first_ages
 from sim.draws import Seeds, draw_slice, draw_year, restored_generator
 from sim.management import check_actions, first_cut_age
-from sim.parameters import check_constants, check_mechanisms
+from sim.parameters import check_constants, check_mechanisms, check_name, check_weather
 from sim.spin_up import (
+    BOUNDARIES,
+    BOUNDARY,
     INITIAL_RANGES,
+    SOIL_CARBONS,
     SPIN_UP_STEPS_PER_DAY,
     SPIN_UP_YEARS,
+    boundary_in_balance,
     climate_draws,
     deep_heat_limits,
     first_state,
     next_deep_heat,
+    soil_carbon_in_balance,
 )
 from sim.state import (
     DAILY,
@@ -49,6 +54,11 @@ class Stands:
     backend : "numba", or "python" (the same source, interpreted).
     constants : literature constants to override, name -> value (see `sim/constants.csv`).
     mechanisms : switches, name -> bool (see `sim.parameters.MECHANISMS`).
+    weather : of the generator: "paper", or "observed", with the daily variability of the records.
+    boundary : the fixed temperature below: "sampled", the site's, or "balanced", the one at which no heat flows through
+        it below the first stand, whatever the site's (`parameters` have it from `start` on).
+    soil_carbon : first soil carbon: "drawn", or "balanced", what the first stand's litter keeps up, where it is not
+        given.
     hwp_half_life_years : half-life of wood products; None keeps them for ever, as the paper does.
     harvest_min_class : youngest age class that thinning may cut: "young", "mature" or "old".
     threads : threads for more than one block; None is one a core.
@@ -64,6 +74,9 @@ class Stands:
         backend="numba",
         constants=None,
         mechanisms=None,
+        weather="paper",
+        boundary="sampled",
+        soil_carbon="drawn",
         hwp_half_life_years=None,
         harvest_min_class="young",
         threads=None,
@@ -78,6 +91,9 @@ class Stands:
         self.backend = backend
         self.constants = check_constants(constants)
         self.mechanisms = check_mechanisms(mechanisms)
+        self.weather = check_weather(weather)
+        self.boundary = check_name("boundary", boundary, BOUNDARIES)
+        self.soil_carbon = check_name("soil_carbon", soil_carbon, SOIL_CARBONS)
         self.first_cut_age = first_cut_age(harvest_min_class, self.constants)
         self.products_decay = yearly_decay(hwp_half_life_years)
         self.threads = available_cores() if threads is None else _positive_integer("threads", threads)
@@ -104,7 +120,7 @@ class Stands:
         ranges = {**INITIAL_RANGES, **(initial_ranges or {})}
         for k, stand in enumerate(stands):
             site = sites[k]
-            values = {**site, **self.constants, **self.mechanisms}
+            values = {**site, **self.constants, **self.mechanisms, **self.weather}
             self.parameters[stand] = [values[name] for name in PARAMETER_NAMES]
             generator = np.random.default_rng(seeds[k].start)
             self.state[stand] = first_state(values, generator, (initial or {}).get(k), ranges)
@@ -113,15 +129,35 @@ class Stands:
             self._weather[stand] = np.random.default_rng(seeds[k].weather)
             self._disturbance[stand] = np.random.default_rng(seeds[k].disturbance)
         whole_year = observed is not None and len(observed) == DAYS * self.steps_per_day
-        self._spin_up(stands, observed if whole_year else None)
+        last_year = self._spin_up(stands, observed if whole_year else None)
+        if self.soil_carbon == "balanced":
+            drawn = [k for k in range(len(stands)) if "soil_kgc_m2" not in ((initial or {}).get(k) or {})]
+            self._balance_soil_carbon(stands[drawn], last_year[drawn])
 
-    def _spin_up(self, stands, observed=None) -> None:
-        """Bring soil, snow and water into balance with the site, with the stand held as it is."""
+    def _balance_soil_carbon(self, stands, record) -> None:
+        """First soil carbon that the litter keeps up; as drawn where there are no trees. record : of a year."""
+        column = STATE_NAMES.index("soil_carbon")
+        stocks = self.stocks(stands)
+        change, respired = (
+            record[:, RECORD_NAMES.index(name)] for name in ("soil_change_kgc_m2", "heterotrophic_respiration_kgc_m2")
+        )
+        balanced = soil_carbon_in_balance(stocks["soil_kgc_m2"], change, respired)
+        trees = stocks["density_stems_ha"] > 0.0
+        self.state[stands, column] = np.where(trees, balanced, stocks["soil_kgc_m2"])
+
+    def _spin_up(self, stands, observed=None) -> np.ndarray:
+        """Bring soil, snow and water, and the boundary if it is to be, into balance, with the stand held as it is.
+
+        Returns the last year's record.
+        """
         first = self.state[stands].copy()
         held = [STATE_NAMES.index(name) for name in HELD_IN_SPIN_UP] + list(range(len(STATE), STATE_SIZE))
         deep, surface = STATE_NAMES.index("deep_heat"), RECORD_NAMES.index("surface_soil_temperature_c")
+        deep_mean, boundary = RECORD_NAMES.index("deep_soil_temperature_c"), PARAMETER_NAMES.index(BOUNDARY)
         draws = np.zeros((len(stands), DRAWS_SIZE))
-        for name, values in climate_draws().items():
+        for name, values in climate_draws(
+            self.weather["weather_as_observed"], self.constants["temperature_persistence"]
+        ).items():
             draws[:, draw_slice(name)] = values
         nothing = np.full(len(stands), 12)
         steps = self.steps_per_day if observed is not None else min(self.steps_per_day, SPIN_UP_STEPS_PER_DAY)
@@ -133,13 +169,15 @@ class Stands:
             state[:, held] = first[:, held]
             gain = state[:, deep] - heat
             if year > 0:  # the first year only lays the snow
-                limits = [
-                    deep_heat_limits(dict(zip(PARAMETER_NAMES, self.parameters[stand], strict=True)), temperature)
-                    for stand, temperature in zip(stands, record[:, surface], strict=True)
-                ]
+                sites = [dict(zip(PARAMETER_NAMES, self.parameters[stand], strict=True)) for stand in stands]
+                limits = [deep_heat_limits(*pair) for pair in zip(sites, record[:, surface], strict=True)]
                 state[:, deep] = next_deep_heat(heat, gain, heat_before, gain_before, np.array(limits))
                 heat_before, gain_before = heat, gain
+                if self.boundary == "balanced":
+                    years = zip(sites, record[:, deep_mean], heat + 0.5 * gain, state[:, deep], strict=True)
+                    self.parameters[stands, boundary] = [boundary_in_balance(*each) for each in years]
             self.state[stands] = state
+        return record
 
     def step(self, actions, stands=None, observed=None, days=DAYS, daily=False):
         """Advance stands by a year under the given actions.

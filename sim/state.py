@@ -44,6 +44,7 @@ DRAWS = {
     "temperature_noise": (True, "normal", "weather"),
     "wet_dice": (True, "uniform", "weather"),
     "wet_amount": (True, "exponential", "weather"),
+    "wind_noise": (True, "normal", "wind"),
     "fire_dice": (True, "uniform", "disturbance"),
     "fire_kill": (False, "uniform", "disturbance"),
     "fire_depth": (False, "uniform", "disturbance"),
@@ -97,6 +98,10 @@ RECORD = {
     "surface_soil_temperature_c": ("degC", "annual mean"),
     "deep_soil_temperature_c": ("degC", "annual mean"),
     "active_layer_depth_m": ("m", "deepest thaw, from the organic surface"),
+    "upper_ground_heat_mj_m2": ("MJ m-2", "heat of the upper 3 m, annual mean; 0 is thawed soil of 0 degC"),
+    "upper_ground_heat_end_mj_m2": ("MJ m-2", "the same at the year's end"),
+    "upper_ground_temperature_c": ("degC", "annual mean of the upper 3 m"),
+    "permafrost_top_temperature_c": ("degC", "annual mean at the depth of the deepest thaw"),
     "boundary_warming_mj_m2": ("MJ m-2", "heat into the permafrost boundary"),
     "boundary_cooling_mj_m2": ("MJ m-2", "heat out of it"),
     "advected_heat_mj_m2": ("MJ m-2", "heat that cold snow and warm rain brought, less what vapour and drainage took"),
@@ -189,11 +194,11 @@ top_of_canopy top_sum transpiration_conifer transpiration_deciduous trial trunk_
 trunk_by_ground trunk_canopy trunk_ground unloading_rate upper_soil vapour vapour_density water_before water_gain
 water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
 floor_water layer_share organic organic_base organic_by_ground organic_conductance organic_sum surface_by_organic
-thaw_water
+thaw_water wind
 """.split()
 
 
-PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS)
+PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS, "weather_as_observed")
 STATE_NAMES = tuple(STATE)
 RECORD_NAMES = tuple(RECORD)
 DAILY_NAMES = tuple(DAILY)

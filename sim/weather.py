@@ -15,6 +15,7 @@ OVER_ICE = (6.1121, 22.587, 273.86)
 OVER_WATER = (6.1094, 17.625, 243.04)
 SATURATION_AT_FREEZING_HPA = OVER_ICE[0]
 LARGEST_RAIN_GROWTH = 1.0  # logarithm
+LARGEST_SWING = 1.0  # of a day's precipitation with its temperature anomaly, relative
 
 
 @compiled
@@ -107,15 +108,24 @@ def precipitation_season(
 
 
 @compiled
-def daily_precipitation(dice, amount, probability, mean, sensitivity, departure) -> float:
+def daily_precipitation(dice, amount, probability, mean, sensitivity, departure, swing) -> float:
     """Precipitation of the day [mm]: `mean` x an exponential deviate `amount` on a wet day, scaled by temperature.
 
     departure : degrees of a rainy day from its season's base temperature (convection), of a snow day from the
     climate's mean for the date. Beyond 2.7 times (15 degC at 0.07 per degree) rain grows no more: air that warm is
     outside the records that the sensitivity is from.
+    swing : the part of the departure that is the day's anomaly, where anomalies are as large as on record:
+    precipitation is linear in it, up to none and twice as much, so that the mean stays.
     """
-    growth = exponential(min(sensitivity * departure, LARGEST_RAIN_GROWTH))
+    growth = exponential(min(sensitivity * (departure - swing), LARGEST_RAIN_GROWTH))
+    growth *= 1.0 + min(max(sensitivity * swing, -LARGEST_SWING), LARGEST_SWING)
     return mean * amount * growth if dice < probability else 0.0
+
+
+@compiled
+def wet_day_factor(probability, factor) -> float:
+    """How many times as often it is wet, with as much less on each wet day; never oftener than every day."""
+    return min(factor, 1.0 / max(probability, 1e-9))
 
 
 @compiled

@@ -3,6 +3,7 @@
 import math
 
 from sim.jit import compiled, phase
+from sim.mathematics import exponential
 from sim.physical_constants import AIR_HEAT_CAPACITY, FREEZING_POINT_K, GRAVITY, VON_KARMAN
 from sim.snow import SNOW_DAY_MM
 
@@ -75,8 +76,17 @@ def ground_exchange(b):
         )
 
 
+@compiled
+def daily_wind(mean, spread, noise) -> float:
+    """Wind speed of a day [m s-1]: log-normal about the site's mean, from a normal deviate; spread : of the log."""
+    return mean * exponential(spread * (noise - 0.5 * spread))
+
+
 @phase
-def day_wind(b):
-    """Exchange with the air at the site's wind speed; an observed wind sets it anew in every step."""
+def day_wind(b, day):
+    """Exchange with the air at the day's wind speed; an observed wind sets it anew in every step."""
+    p, w, d = b.p, b.w, b.d
     for i in range(len(b.s.swe)):
-        wind_exchange(b, i, b.p.wind_speed_m_s[i])
+        spread = p.wind_spread[i] * p.weather_as_observed[i]
+        w.wind[i] = daily_wind(p.wind_speed_m_s[i], spread, d.wind_noise[day, i])
+        wind_exchange(b, i, w.wind[i])

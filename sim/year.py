@@ -13,6 +13,7 @@ from sim.interception import unloading_rates
 from sim.jit import phase
 from sim.management import manage
 from sim.organic import renew_organic_layer
+from sim.permafrost import add_upper_ground
 from sim.photosynthesis import dryness_slopes
 from sim.physical_constants import SECONDS_PER_DAY
 from sim.snow import settle_snow
@@ -48,6 +49,7 @@ def simulate_year(block, steps_per_day, days, observed, daily):
             simulate_step(b, seconds)
         settle_snow(b, steps_per_day)
         end_day(b, day, steps_per_day, daily)
+        add_upper_ground(b)
     end_year(b)
 
 

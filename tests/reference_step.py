@@ -102,10 +102,13 @@ def daily_mean_temperature(p, day, anomaly):
 
 def temperature_anomaly(p, day, yesterday, noise):
     """The day's departure from the season [K]; nothing is remembered from the year before."""
+    spread = p.daily_noise_std_c
+    if p.weather_as_observed:
+        spread *= getattr(p, f"noise_factor_{season(day)}")
     if day == 0:
-        return p.daily_noise_std_c * noise
+        return spread * noise
     memory = p.temperature_persistence
-    return memory * yesterday + math.sqrt(1.0 - memory**2) * p.daily_noise_std_c * noise
+    return memory * yesterday + math.sqrt(1.0 - memory**2) * spread * noise
 
 
 def daily_precipitation(p, day, celsius, anomaly, dice, amount):
@@ -116,18 +119,24 @@ def daily_precipitation(p, day, celsius, anomaly, dice, amount):
         or p.autumn_shoulder_start_day <= number < p.autumn_shoulder_end_day
     )
     in_snow_season = number < p.snow_season_end_day or number >= p.snow_season_start_day
+    swing = anomaly
     if p.summer_start_day <= number < p.summer_end_day:
         probability, mean, sensitivity = p.summer_rain_prob, p.summer_rain_mm_day, p.summer_precip_temp_sensitivity
         departure = celsius - p.summer_precip_base_temp_c
     elif in_snow_season and (celsius < 0.0 or not in_shoulder):
         probability, sensitivity = p.winter_snow_prob, p.winter_precip_temp_sensitivity
         mean = p.winter_snow_mm_day * (p.snowfall_scale if p.snowfall_limit else 1.0)
-        departure = anomaly if p.snowfall_limit else 0.0
+        departure = swing = anomaly if p.snowfall_limit else 0.0
     else:
         probability, mean = p.shoulder_rain_prob, p.shoulder_rain_mm_day
         sensitivity = p.shoulder_precip_temp_sensitivity
         departure = celsius - p.shoulder_precip_base_temp_c
-    return mean * amount * math.exp(min(sensitivity * departure, 1.0)) if dice < probability else 0.0
+    if not p.weather_as_observed:
+        return mean * amount * math.exp(min(sensitivity * departure, 1.0)) if dice < probability else 0.0
+    # Oftener and less at a time; with the anomaly in a straight line from none to twice as much.
+    often = p.wet_day_factor if probability * p.wet_day_factor < 1.0 else 1.0 / probability
+    growth = math.exp(min(sensitivity * (departure - swing), 1.0)) * min(max(1.0 + sensitivity * swing, 0.0), 2.0)
+    return mean / often * amount * growth if dice < probability * often else 0.0
 
 
 def diurnal_amplitude(p, day, precipitation):
@@ -151,7 +160,13 @@ def air_density(p, celsius):
     return 100.0 * p.air_pressure_hpa / (GAS_CONSTANT * (celsius + FREEZING_K))
 
 
-def generated_weather(p, day, yesterday, noise, dice, amount):
+def daily_wind(p, deviate):
+    """Wind speed of a day [m s-1], with a logarithm that is normal, and the site's mean."""
+    spread = p.wind_spread if p.weather_as_observed else 0.0
+    return p.wind_speed_m_s * math.exp(spread * deviate) / math.exp(spread**2 / 2.0)
+
+
+def generated_weather(p, day, yesterday, noise, dice, amount, windiness):
     """A day's weather from its draws; `yesterday` is the temperature anomaly of the day before."""
     anomaly = temperature_anomaly(p, day, yesterday, noise)
     mean = daily_mean_temperature(p, day, anomaly)
@@ -163,6 +178,10 @@ def generated_weather(p, day, yesterday, noise, dice, amount):
     half_year = "warm" if quarter in ("spring", "summer") else "cold"
     cloud = getattr(p, f"cloud_wet_{half_year}" if wet == "wet" else f"cloud_dry_{quarter}")
     clearness = getattr(p, f"clearness_{wet}_{quarter}")
+    if p.weather_as_observed and wet == "dry":
+        clearness = getattr(p, f"clearness_observed_dry_{quarter}")
+        if quarter in ("summer", "autumn"):
+            cloud = getattr(p, f"cloud_observed_dry_{quarter}")
     return SimpleNamespace(
         anomaly=anomaly,
         mean=mean,
@@ -173,6 +192,7 @@ def generated_weather(p, day, yesterday, noise, dice, amount):
         emissivity=sky_emissivity(mean, vapour, cloud),
         clearness=clearness,
         diffuse=diffuse_share(clearness),
+        wind=daily_wind(p, windiness),
         rows=None,
     )
 
@@ -200,7 +220,7 @@ def generated_air(p, today, step, steps_per_day):
     return SimpleNamespace(
         celsius=celsius,
         vapour=weather.vapour,
-        wind=p.wind_speed_m_s,
+        wind=weather.wind,
         shortwave=weather.clearness * extraterrestrial * sine,
         longwave=weather.emissivity * black_body(celsius),
         precipitation=weather.precipitation / steps_per_day,
@@ -488,7 +508,7 @@ def snow_sublimation(p, air, store, capacity, net_radiation, exchange, seconds):
         return 0.0
     over_ice = air.gamma * VAPORISATION / SUBLIMATION
     rate = (air.slope * max(net_radiation, 0.0) + exchange * max(air.deficit, 0.0)) / (air.slope + over_ice)
-    covered = max(min(store / capacity, 1.0), 1e-9) ** (2.0 / 3.0)
+    covered = min(store / capacity, 1.0) ** (2.0 / 3.0)
     return min(p.sublimation_exposure * covered * rate / SUBLIMATION * seconds, store)
 
 

@@ -17,7 +17,9 @@ from mo_gymnasium.wrappers import LinearReward
 from playing import ENTRIES, QUICK, THREE, TIMBER, WITHOUT_SITE, assert_same, play, quick, quick_vector, vector_trace
 
 import boreal_env
+import sim
 from boreal_env import BorealEnv, BorealVectorEnv, Reward
+from sim.state import PARAMETER_NAMES
 
 IDS = ("boreal-generalist-v0", "boreal-site-specific-v0", "boreal-balanced-v0")
 
@@ -49,10 +51,24 @@ def test_an_episode_is_fifty_years_by_default():
     assert gym.make("boreal-generalist-v0").unwrapped.years == 50
 
 
-def test_the_balanced_id_changes_one_constant_only():
+def test_the_balanced_id_is_in_balance_and_the_papers_are_the_papers():
     paper, balanced = (gym.make(name).unwrapped._episodes for name in ("boreal-generalist-v0", "boreal-balanced-v0"))
     assert paper.reward == Reward()
     assert balanced.reward == Reward(carbon_scale=boreal_env.BALANCED_CARBON_SCALE) != paper.reward
+    for episodes, world in ((paper, ("sampled", "drawn", 0.0)), (balanced, ("balanced", "balanced", 1.0))):
+        stands = episodes.stands
+        assert (stands.boundary, stands.soil_carbon, stands.weather["weather_as_observed"]) == world
+
+
+def test_the_balanced_boundary_is_observed():
+    env = quick(**boreal_env.BALANCED_WORLD)
+    observation, _ = env.reset(seed=3, options={"site": {"mean_annual_temperature_c": -16.0}})
+    assert observation in env.observation_space
+    name = "site_deep_boundary_temperature_k"
+    found = boreal_env.in_unit(observation[None], name)[0]
+    stands = env._episodes.stands
+    assert found == pytest.approx(stands.parameters[0, PARAMETER_NAMES.index("deep_boundary_temperature_k")], abs=1e-3)
+    assert found < sim.SITE_PARAMETERS["deep_boundary_temperature_k"].low  # a cold place is cold below
 
 
 def test_the_balanced_id_keeps_its_constant_beside_others():

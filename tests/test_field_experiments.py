@@ -7,7 +7,7 @@ from scripts import run_script
 
 import sim
 from analysis.studies import planting_signs
-from analysis.validation import balanced_boundary, clear_cut, field_report, robustness_report
+from analysis.validation import balanced_boundary, clear_cut, field_report, robustness_report, thaw_agreement
 from analysis.validation.scores import Band
 
 
@@ -34,11 +34,14 @@ def test_a_cut_lets_heat_into_the_ground_and_leaves_the_forest_alone():
 
 def test_a_boundary_in_balance_takes_no_heat():
     seeds = [sim.episode_seeds(k) for k in (1, 2)]
-    sites, heat = balanced_boundary.balanced([sim.sample_site(k) for k in (1, 2)], seeds)
-    assert (np.abs(heat) < 0.5).all()
-    for k, site in zip((1, 2), sites, strict=True):
-        sampled = sim.sample_site(k)
-        assert {name for name in site if site[name] != sampled[name]} == {balanced_boundary.BOUNDARY}
+    boundary, heat = balanced_boundary.run_held([sim.sample_site(k) for k in (1, 2)], seeds)
+    assert (np.abs(heat) < robustness_report.BALANCE.high).all()
+    assert (np.abs(boundary - [sim.sample_site(k)["deep_boundary_temperature_k"] for k in (1, 2)]) > 0.01).all()
+
+
+def test_measures_of_thaw_agree_where_their_signs_do():
+    measures = {"flux": np.array([1.0, -1.0, 2.0, 0.0]), "depth": np.array([3.0, 1.0, 0.1, 1.0])}
+    assert thaw_agreement.disagreement(measures["flux"], measures["depth"]) == 1.0 / 3.0
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,19 @@ def test_components_add_up_to_the_carbon_reward(episode):
     assert y["biomass_limit_penalty"].max() > 0.0 and y["soil_limit_penalty"].max() > 0.0
 
 
+def test_thaw_as_the_field_measures_it_is_ready():
+    env = quick(objectives=("thaw", "active_layer", "permafrost_heat"), record_years=True)
+    _, rewards, info, *_ = play(env, [12] * env.years, seed=1)
+    y = info["years"]
+    depth, heat = y["active_layer_depth_m"], y["upper_ground_heat_mj_m2"]
+    np.testing.assert_allclose(rewards[:, 1], np.clip(1.0 - depth, -1.0, 1.0), rtol=1e-6)
+    np.testing.assert_allclose(rewards[:, 2], np.clip(-1.0 - heat / 135.0, -1.0, 1.0), rtol=1e-6)
+    assert info["active_layer_return"] == pytest.approx(y["active_layer_reward"].sum())
+    assert pickle.loads(pickle.dumps(env)).objective_names == ("thaw", "active_layer", "permafrost_heat")
+    with pytest.raises(ValueError, match="each is allowed once"):
+        quick(objectives=("active_layer", boreal_env.FIELD_OBJECTIVES["active_layer"]))
+
+
 AMOUNTS = st.floats(0.0, 200.0)
 
 

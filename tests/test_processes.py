@@ -4,6 +4,7 @@ import importlib
 import math
 import re
 from pathlib import Path
+from statistics import NormalDist
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,6 @@ from hypothesis import strategies as st
 from numba.core.dispatcher import Dispatcher
 from pytest import approx
 
-import sim.active_layer
 import sim.canopy
 import sim.carbon
 import sim.demography
@@ -23,6 +23,7 @@ import sim.interception
 import sim.management
 import sim.mathematics
 import sim.organic
+import sim.permafrost
 import sim.photosynthesis
 import sim.radiation
 import sim.response
@@ -41,11 +42,11 @@ def plain(module):
     return SimpleNamespace(**{k: uncompiled(v) if isinstance(v, Dispatcher) else v for k, v in vars(module).items()})
 
 
-active_layer, canopy, carbon, demography = map(plain, (sim.active_layer, sim.canopy, sim.carbon, sim.demography))
+canopy, carbon, demography = map(plain, (sim.canopy, sim.carbon, sim.demography))
 disturbance, evaporation, organic = map(plain, (sim.disturbance, sim.evaporation, sim.organic))
 interception, management, mathematics = map(plain, (sim.interception, sim.management, sim.mathematics))
 photosynthesis, radiation, response = map(plain, (sim.photosynthesis, sim.radiation, sim.response))
-snow, soil, structure = map(plain, (sim.snow, sim.soil, sim.structure))
+permafrost, snow, soil, structure = map(plain, (sim.permafrost, sim.snow, sim.soil, sim.structure))
 water, weather, wind = map(plain, (sim.water, sim.weather, sim.wind))
 
 share = st.floats(0.0, 1.0)
@@ -159,9 +160,27 @@ def test_precipitation_season(day, celsius, kind):
 
 
 def test_daily_precipitation():
-    assert weather.daily_precipitation(0.2, 1.0, 0.2, 10.0, 0.1, 0.0) == 0.0
-    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, 0.0) == approx(5.0)
-    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, -10.0) == approx(5.0 / math.e)
+    assert weather.daily_precipitation(0.2, 1.0, 0.2, 10.0, 0.1, 0.0, 0.0) == 0.0
+    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, 0.0, 0.0) == approx(5.0)
+    assert weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, -10.0, 0.0) == approx(5.0 / math.e)
+    # Large anomalies: in a straight line, from none to twice as much, about what the season gives.
+    for swing, factor in ((-20.0, 0.0), (-5.0, 0.5), (0.0, 1.0), (5.0, 1.5), (20.0, 2.0)):
+        amount = weather.daily_precipitation(0.1, 0.5, 0.2, 10.0, 0.1, swing - 10.0, swing)
+        assert amount == approx(5.0 / math.e * factor)
+
+
+def test_oftener_wet_but_never_oftener_than_every_day():
+    assert weather.wet_day_factor(0.1, 3.0) == 3.0
+    assert weather.wet_day_factor(0.5, 3.0) == approx(2.0)
+    assert weather.wet_day_factor(0.0, 3.0) == 3.0
+
+
+def test_a_varying_wind_keeps_its_mean():
+    shares = (np.arange(2000) + 0.5) / 2000
+    speeds = np.array([wind.daily_wind(3.0, 0.38, NormalDist().inv_cdf(share)) for share in shares])
+    assert speeds.mean() == approx(3.0, rel=1e-3)
+    assert speeds.std() / speeds.mean() == approx(math.sqrt(math.exp(0.38**2) - 1.0), rel=0.01)
+    assert wind.daily_wind(3.0, 0.0, 1.7) == 3.0
 
 
 def test_rain_damps_the_diurnal_range():
@@ -397,7 +416,7 @@ def test_thaw_depth_of_stefan():
     rest = (-3.0, 2.5, 12.0, 1.2, 1.7)  # boundary, deep node, boundary's depth, conductivities
 
     def thaw(organic, ice, warmth, deep, *capacities, rest=rest, seconds=days):
-        return active_layer.thaw_depth(organic, ice, 0.2, warmth, seconds, deep, *rest, *capacities, latent)
+        return permafrost.thaw_depth(organic, ice, 0.2, warmth, seconds, deep, *rest, *capacities, latent)
 
     # Without moss, cold soil or heat capacity: sqrt(2 k T t / L).
     assert thaw(0.0, 0.0, warmth, 0.0, 0.0, 0.0) == approx(math.sqrt(2.4 * warmth / latent), rel=1e-12)
@@ -445,6 +464,14 @@ def test_moss_gives_vapour_as_air_and_wetness_let_it():
     assert evaporation.moss_conductance(0.01, 0.0, 300.0) == 0.0
     assert evaporation.moss_conductance(0.01, 1.0, 300.0) == approx(1.0 / (100.0 + 300.0))
     assert evaporation.moss_conductance(0.01, 0.5, 300.0) == approx(1.0 / (100.0 + 1200.0))
+
+
+def test_upper_ground_by_hand():
+    assert permafrost.upper_temperature(-1.0, -4.0, 1.0) == approx(-3.0)
+    profile = (2.0, -1.0, -4.0, -2.0, 1.0, 2.5, 12.0)  # top, surface, deep, boundary; their depths
+    for depth, expected in ((-0.1, 2.0), (0.0, 2.0), (0.25, 0.5), (0.5, -1.0), (1.5, -2.5), (2.5, -4.0), (7.25, -3.0)):
+        assert permafrost.temperature_at(depth, *profile) == approx(expected)
+    assert permafrost.temperature_at(12.0, *profile) == permafrost.temperature_at(40.0, *profile) == approx(-2.0)
 
 
 def test_nodes_answer_to_the_canopy_as_their_implicit_balances_say():

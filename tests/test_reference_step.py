@@ -41,7 +41,7 @@ AGREEMENT = 1e-10  # of the natural scale
 STEPS = 2  # from each drawn state
 STEPS_PER_DAY = (12, 48, 144)
 FEWEST = 5  # steps with each of the features
-DAILY_WEATHER_DRAWS = ("temperature_noise", "wet_dice", "wet_amount")
+DAILY_WEATHER_DRAWS = ("temperature_noise", "wet_dice", "wet_amount", "wind_noise")
 
 # Name -> (limits of the site's parameters, corners or even draws, weather, cases).
 KINDS = {
@@ -79,7 +79,8 @@ def draw_parameters(generator, limits, how):
         }
         if all(p[low] < p[high] for low, high in ORDERED_CONSTANTS):
             break
-    return SimpleNamespace(**p, **{name: float(generator.random() > 0.1) for name in MECHANISMS})
+    switches = {name: float(generator.random() > 0.1) for name in MECHANISMS}
+    return SimpleNamespace(**p, **switches, weather_as_observed=float(generator.random() > 0.5))
 
 
 def season_of(p, day):
@@ -252,6 +253,7 @@ def features_of(p, before, after, fluxes, steps_per_day):
         found[f"{node} soil frozen"] = p.soil_freezing > 0.0 and celsius < -p.soil_freezing_range_k
     found |= {f"{1440 // steps} minutes": steps == steps_per_day for steps in STEPS_PER_DAY}
     found |= {f"without {name}": getattr(p, name) == 0.0 for name in MECHANISMS}
+    found |= {f"weather as observed: {on}": p.weather_as_observed == on for on in (0.0, 1.0)}
     return found
 
 
@@ -322,8 +324,9 @@ def test_the_steps_have_all_that_a_step_can_have():
 @pytest.mark.parametrize("limits", ["sampled", "physical"])
 def test_generated_weather_of_every_day(limits):
     generator = np.random.default_rng(365)
-    for _ in range(3):
+    for as_observed in (0.0, 1.0, 1.0):
         p = draw_parameters(generator, limits, "even")
+        p.weather_as_observed = as_observed
         draws, _ = draw_generated(generator)
         b = fill_block(p, draw_state(generator, p, 0), draws, 0.0)
         begin_year(b)
@@ -335,7 +338,7 @@ def test_generated_weather_of_every_day(limits):
             yesterday = expected.anomaly
             for name in ("mean", "minimum"):
                 assert getattr(b.w, f"{name}_temperature")[0] == approx(getattr(expected, name), abs=1e-10)
-            for name in ("precipitation", "vapour", "emissivity", "diffuse"):
+            for name in ("precipitation", "vapour", "emissivity", "diffuse", "wind"):
                 assert getattr(b.w, name)[0] == approx(getattr(expected, name), rel=1e-10)
 
 

@@ -153,6 +153,80 @@ def test_every_mechanism_can_be_switched_off(mechanism):
         assert off.canopy_sublimation_mm.max() == 0.0 < on.canopy_sublimation_mm.max()
 
 
+# --------------------------------------------------------------------------------- worlds in balance, as observed
+
+
+def test_no_heat_flows_through_a_boundary_in_balance():
+    site = {"mean_annual_temperature_c": -9.0, "deep_boundary_temperature_k": 272.0}
+    heat = {}
+    for boundary in ("sampled", "balanced"):
+        table = simulate(site, boundary=boundary, years=10, mechanisms={"fire": False})
+        heat[boundary] = (table.boundary_warming_mj_m2 - table.boundary_cooling_mj_m2).mean()
+    assert abs(heat["balanced"]) < 5.0 < abs(heat["sampled"])
+
+
+def test_the_boundary_in_balance_does_not_hang_on_the_sites_own():
+    tables = [simulate({"deep_boundary_temperature_k": k}, boundary="balanced") for k in (262.0, 278.0)]
+    difference = (tables[0] - tables[1]).deep_soil_temperature_c[0]
+    assert abs(difference) < 0.2
+
+
+def test_balanced_soil_carbon_keeps_what_it_gets():
+    initial = {"conifer_mature_stems_ha": 1500.0, "biomass_kgc_m2": 5.6}
+    quiet = {"fire": False, "insects": False}
+    drawn, balanced = (
+        simulate(initial=initial, soil_carbon=how, mechanisms=quiet, time_step_minutes=120, years=5).mean()
+        for how in ("drawn", "balanced")
+    )
+    assert abs(balanced.soil_change_kgc_m2) < 0.2 * balanced.litterfall_kgc_m2 < drawn.soil_change_kgc_m2
+    given = simulate(initial={**initial, "soil_kgc_m2": 3.0}, soil_carbon="balanced")
+    assert given.soil_kgc_m2[0] - given.soil_change_kgc_m2[0] == pytest.approx(3.0)
+    treeless = {"density_stems_ha": 0.0}
+    pd.testing.assert_frame_equal(simulate(initial=treeless, soil_carbon="balanced"), simulate(initial=treeless))
+
+
+def test_weather_as_observed_varies_more_and_keeps_its_means():
+    paper, observed_ = (simulate(years=40, weather=w, output="daily") for w in ("paper", "observed"))
+    assert paper.air_temperature_c.mean() == pytest.approx(observed_.air_temperature_c.mean(), abs=0.5)
+    for name, error in (("precipitation_mm", 0.1), ("shortwave_mj_m2", 0.03)):
+        assert observed_[name].sum() == pytest.approx(paper[name].sum(), rel=error)
+
+    def anomaly(table, days):
+        course = table.air_temperature_c.to_numpy().reshape(-1, 365)
+        return (course - course.mean(axis=0))[:, days].std()
+
+    january, july = slice(0, 31), slice(181, 212)
+    assert anomaly(paper, january) < 2.0 and 7.0 < anomaly(observed_, january) < 11.0
+    assert 2.4 < anomaly(observed_, july) < 4.0
+    wet_days = [(table.precipitation_mm > 0.0).mean() for table in (paper, observed_)]
+    assert wet_days[1] == pytest.approx(3.0 * wet_days[0], rel=0.1)
+
+
+def test_the_papers_weather_does_not_hang_on_the_draws_of_wind():
+    site = {"wind_speed_m_s": 3.0}
+    pd.testing.assert_frame_equal(simulate(site, constants={"wind_spread": 0.9}), simulate(site))
+
+
+# ------------------------------------------------------------------------------ thaw as the field measures it
+
+
+def test_the_upper_ground_holds_less_heat_where_it_is_frozen():
+    table = simulate({"mean_annual_temperature_c": -9.0}, years=2, boundary="balanced")
+    water = 3.34e5 * 1000.0 * CONSTANTS["soil_freezing_water"].low * 3.0 * 1e-6
+    assert (table.upper_ground_heat_mj_m2 < 0.0).all() and (table.upper_ground_heat_mj_m2 > -1.5 * water).all()
+    assert (table.upper_ground_heat_end_mj_m2 < -0.5 * water).all()  # winter
+    mean = (table.surface_soil_temperature_c + 2.0 * table.deep_soil_temperature_c) / 3.0
+    np.testing.assert_allclose(table.upper_ground_temperature_c, mean, rtol=1e-12)
+    assert (table.permafrost_top_temperature_c < 0.0).all()
+
+
+def test_without_permafrost_its_top_is_as_warm_as_the_boundary():
+    warm = {"mean_annual_temperature_c": 5.0, "deep_boundary_temperature_k": 278.0}
+    table = simulate(warm, years=2)
+    assert (table.upper_ground_heat_mj_m2 > 0.0).all()
+    np.testing.assert_allclose(table.permafrost_top_temperature_c, 278.0 - 273.15)
+
+
 # --------------------------------------------------------------------------- what an override leaves unchanged
 
 

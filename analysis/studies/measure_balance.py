@@ -1,4 +1,4 @@
-"""Measures the one constant of `boreal-balanced-v0`: the carbon scale at which both returns vary equally.
+"""Measures the carbon scale of `boreal-balanced-v0`, at which both returns vary equally in its world.
 
 Reference policies, the 25 constant actions (no change where an action is not valid) and the four fixed strategies,
 play the same sites and weathers. The spread of a return is its standard deviation between the policies of one site,
@@ -44,7 +44,9 @@ def where_valid(masks: np.ndarray, action: int) -> np.ndarray:
 def play(args: Args, **reward) -> np.ndarray:
     """Net carbon change [kgC m-2], carbon and thaw return of every episode, shape (policies, sites, 3)."""
     seeds = [FIRST_SEED + site for site in range(args.sites)]
-    envs = boreal_env.BorealVectorEnv(args.sites, years=args.years, record_years=True, reward=reward)
+    envs = boreal_env.BorealVectorEnv(
+        args.sites, years=args.years, record_years=True, reward=reward, **boreal_env.BALANCED_WORLD
+    )
     columns = ("net_carbon_change_kgc_m2", "carbon_reward", "thaw_reward")
     sums = []
     for policy in reference_policies().values():

@@ -55,16 +55,16 @@ class Episodes(NamedTuple):
         return (self.record[:, :, _COLUMN["planted_stems_ha"]] * mix).sum(axis=1)
 
 
-def play(sites, seeds, plans, *, initial=None, constants=None, mechanisms=None, threads=None) -> Episodes:
+def play(sites, seeds, plans, *, initial=None, **arguments) -> Episodes:
     """Play plans: an action where it can be carried out in full, no change elsewhere, as a masked agent would.
 
     sites : for each episode its 62 parameters by name; seeds : for each its `sim.Seeds`; plans : actions, integers
-    (n, years); initial : episode -> first stocks, see `sim.Stands.start`; constants, mechanisms, threads : see
-    `sim.Stands`. Rewards are the paper's.
+    (n, years); initial : episode -> first stocks, see `sim.Stands.start`; arguments : of `sim.Stands`, such as
+    constants, weather, boundary, threads. Rewards are the paper's.
     """
     plans = np.asarray(plans)
     everyone = np.arange(len(plans))
-    stands = sim.Stands(len(plans), constants=constants, mechanisms=mechanisms, threads=threads)
+    stands = sim.Stands(len(plans), **arguments)
     stands.start(everyone, sites, seeds, initial)
     start = stands.stocks(everyone)
     rewards = np.empty((*plans.shape, 2))

@@ -26,6 +26,9 @@ from sim.task.observation import Moment, Table, observation_rows
 from sim.task.preference import check_weights, draw_weights, shown
 
 MODES = ("generalist", "site_specific")
+
+#: The world of `boreal-balanced-v0`, as arguments of an environment or of `sim.Stands`.
+BALANCED_WORLD = {"boundary": "balanced", "soil_carbon": "balanced", "weather": "observed"}
 DEFAULT_YEARS = 50
 
 
@@ -53,6 +56,9 @@ class Episodes:
         objectives=PAPER_OBJECTIVES,
         mechanisms=None,
         constants=None,
+        weather="paper",
+        boundary="sampled",
+        soil_carbon="drawn",
         observation_groups=None,
         record_years=False,
     ):
@@ -91,6 +97,9 @@ class Episodes:
             backend=backend,
             constants=constants,
             mechanisms=mechanisms,
+            weather=weather,
+            boundary=boundary,
+            soil_carbon=soil_carbon,
             hwp_half_life_years=hwp_half_life_years,
             harvest_min_class=harvest_min_class,
             threads=threads,

@@ -1,4 +1,4 @@
-"""What is rewarded: the paper's two objectives, [carbon, thaw], and any `Objective` of a user's own."""
+"""What is rewarded: the paper's two objectives, [carbon, thaw], thaw as the field measures it, and a user's own."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -202,13 +202,40 @@ class Objective:
         return {f"{self.name}_clipped": value - reward, f"{self.name}_reward": reward}
 
 
+#: Thaw depth [m] at which "active_layer" gives nothing; twice that gives -1.
+THAW_DEPTH_SCALE_M = 1.0
+
+#: Heat of the upper 3 m [MJ m-2] that "permafrost_heat" counts in: 3 m of soil frozen at about -2 degC hold twice as
+#: much less than thawed soil, and give 1, thawed soil of 0 degC gives -1.
+UPPER_GROUND_HEAT_SCALE = 135.0
+
+
+def shallow_thaw(year: dict[str, np.ndarray]) -> np.ndarray:
+    """How shallow the year's thaw was: 1 for none, 0 for `THAW_DEPTH_SCALE_M`."""
+    return 1.0 - year["active_layer_depth_m"] / THAW_DEPTH_SCALE_M
+
+
+def frozen_ground(year: dict[str, np.ndarray]) -> np.ndarray:
+    """How frozen the upper 3 m were in the year's mean: 1 for all, -1 for not at all."""
+    return -1.0 - year["upper_ground_heat_mj_m2"] / UPPER_GROUND_HEAT_SCALE
+
+
+#: Objectives that can be asked for by name, beside the paper's: thaw as the field measures it.
+FIELD_OBJECTIVES = {
+    "active_layer": Objective("active_layer", shallow_thaw),
+    "permafrost_heat": Objective("permafrost_heat", frozen_ground),
+}
+
+
 def check_objectives(objectives: Sequence) -> tuple:
-    """Objectives of an environment: names of the paper's, and `Objective`s, each once."""
+    """Objectives of an environment, each once: names of the paper's, and `Objective`s, of which some have a name."""
+    allowed = (*PAPER_OBJECTIVES, *FIELD_OBJECTIVES)
     if isinstance(objectives, str) or not np.iterable(objectives) or not len(objectives):
-        raise ValueError(f"objectives: a sequence of {', '.join(PAPER_OBJECTIVES)} and Objective, got {objectives!r}")
+        raise ValueError(f"objectives: a sequence of {', '.join(allowed)} and Objective, got {objectives!r}")
     for objective in objectives:
         if not isinstance(objective, Objective):
-            check_choice("objective", objective, PAPER_OBJECTIVES)
+            check_choice("objective", objective, allowed)
+    objectives = [FIELD_OBJECTIVES.get(o, o) if isinstance(o, str) else o for o in objectives]
     names = objective_names(objectives)
     if len(set(names)) < len(names):
         raise ValueError(f"objectives {', '.join(names)}: each is allowed once")
