@@ -8,9 +8,13 @@ from sim.weather import drought_index
 
 
 @compiled
-def fire_hazard(base, conifer, deciduous, flammability_conifer, flammability_deciduous) -> float:
-    """Probability of fire on a summer day that is dry and warm enough, by the cover of each species."""
-    return base * (conifer * flammability_conifer + deciduous * flammability_deciduous)
+def fire_hazard(base, conifer, deciduous, flammability_conifer, flammability_deciduous, flammability_open) -> float:
+    """Probability of fire on a summer day that is dry and warm enough, by the cover of each species; between the
+    crowns the ground vegetation burns."""
+    open_ground = 1.0 - conifer - deciduous
+    return base * (
+        conifer * flammability_conifer + deciduous * flammability_deciduous + open_ground * flammability_open
+    )
 
 
 @compiled
@@ -55,6 +59,7 @@ def ignites(b, day, i) -> bool:
         w.cover_deciduous[i],
         p.flammability_conifer[i],
         p.flammability_deciduous[i],
+        p.flammability_open[i],
     )
     summer = p.summer_start_day[i] <= day + 1 < p.summer_end_day[i]
     ready = fire_weather(s.drought[i], w.mean_temperature[i], p.fire_drought_threshold[i], p.fire_temperature_c[i])
@@ -77,6 +82,8 @@ def burn(b, i):
     s.soil_carbon[i] += conifer + deciduous - burned - soil
     r.fire_mortality[i] = killed
     r.fire_mortality_kgc_m2[i] += conifer + deciduous - burned
+    r.burned_trees_kgc_m2[i] += burned
+    r.burned_soil_kgc_m2[i] += soil
     r.fire_loss_kgc_m2[i] += burned + soil
     crown_areas(b, i)
 
