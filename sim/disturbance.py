@@ -18,6 +18,13 @@ def fire_hazard(base, conifer, deciduous, flammability_conifer, flammability_dec
 
 
 @compiled
+def ground_fuel(depth, equilibrium) -> float:
+    """Share of the ground layer's fuel that is there: moss and litter grow back after a fire, up to that of open
+    ground. depth, equilibrium : of the organic layer [m]."""
+    return min(depth / equilibrium, 1.0) if equilibrium > 0.0 else 0.0
+
+
+@compiled
 def fire_weather(drought, temperature, threshold, temperature_threshold) -> bool:
     """Whether a day is dry and warm enough for fire."""
     return drought > threshold and temperature > temperature_threshold
@@ -59,7 +66,7 @@ def ignites(b, day, i) -> bool:
         w.cover_deciduous[i],
         p.flammability_conifer[i],
         p.flammability_deciduous[i],
-        p.flammability_open[i],
+        p.flammability_open[i] * ground_fuel(s.organic_depth[i], p.organic_depth_open_m[i]),
     )
     summer = p.summer_start_day[i] <= day + 1 < p.summer_end_day[i]
     ready = fire_weather(s.drought[i], w.mean_temperature[i], p.fire_drought_threshold[i], p.fire_temperature_c[i])

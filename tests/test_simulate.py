@@ -142,7 +142,7 @@ def test_any_divisor_of_a_day_is_a_time_step(minutes):
 def test_every_mechanism_can_be_switched_off(mechanism):
     burning = {"fire_base_probability": 0.05, "fire_drought_threshold": 0.0, "insect_base_probability": 1.0}
     initial = {"density_stems_ha": 8000.0, "biomass_kgc_m2": 8.0}  # so dense that insects come after the fire, too
-    site = {**burning, "mean_annual_temperature_c": -8.0}
+    site = {**burning, "mean_annual_temperature_c": -2.0}
     on = simulate(site, initial=initial, years=2)
     off = simulate(site, initial=initial, years=2, mechanisms={mechanism: False})
     assert not on.equals(off)
