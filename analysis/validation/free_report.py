@@ -122,13 +122,14 @@ def report(sites: int) -> Part:
     )
     text = f"""{sites} sites drawn as for episodes of the environment; {STAND_YEARS} years of weather as generated,
 the same for every course. Nothing is put back. Stands begin as drawn or, where mature, with 1000 stems/ha of 41-100
-years, half of each species, and 6 kgC/m2. They burn and have insects, and are planted with 100 stems/ha a year as far as
-there is room. After fire is a mature stand that burns in the first year, and not again. Even-aged stands are
+years, half of each species, and 6 kgC/m2. They burn and have insects, and are planted with 100 stems/ha a year as far
+as there is room. After fire is a mature stand that burns in the first year, and not again. Even-aged stands are
 {number(SEEDLINGS_HA, 0)} seedlings/ha on open ground; they do not burn, so that their age is the time since fire. Cells
 are the median over sites (10-90 %); fluxes are means of up to {WINDOW} years that end in the one named. Deaths are the
-share of the biomass that dies in a year, fire aside. NEP leaves fire and products out. Basal area is no output of the simulator: a species' carbon is
-shared among its stems by their relative carbon, and a stem of C kgC is (C/{STEM_KGC:g})^(1/{STEM_EXPONENT:g}) cm thick,
-so that 30 and 64 kgC are 15 and 20 cm (Lambert et al. 2005); it is as good as that.
+share of the biomass that dies in a year, fire aside. NEP leaves fire and products out. Basal area is no output of the
+simulator: a species' carbon is shared among its stems by their relative carbon, and a stem of C kgC is
+(C/{STEM_KGC:g})^(1/{STEM_EXPONENT:g}) cm thick, so that 30 and 64 kgC are 15 and 20 cm (Lambert et al. 2005); it is as
+good as that.
 
 Of retained trees in Alberta 2.9 % (spruce), 6.1 % (aspen) and 8.7 % (birch) died a year, 2.5 to 4 times as many as in
 reference stands (Bladon et al. 2008): 0.7-1.2, 1.5-2.4 and 2.2-3.5 % of stems there. The stems that die are small
