@@ -179,7 +179,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `site_seed`: one site (`sim.sample_site(site_seed)`) instead of a new one each episode
     - `parameter_overrides`: site parameter -> value or (low, high), see `sim/site_parameters.csv`; nothing else of the
       site changes, but with `latitude_deg` the mean annual temperature, which is drawn around its latitude's
-    - `initial_ranges`: first stock -> (low, high), see `sim.INITIAL_RANGES`; biomass is at most 120 kgC a stem
+    - `initial_ranges`: first stock -> (low, high), see `sim.INITIAL_RANGES`; biomass is at most 120 kgC a stem,
+      and the stems' age follows from it unless `oldest_age_years` has a range
     - `hwp_half_life_years`: half-life of wood products (None: for ever)
     - `harvest_min_class`: youngest class that may be cut: "young", "mature" or "old"
     - `reward`: a `Reward`, or a dict of the constants to change

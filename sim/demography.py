@@ -5,6 +5,7 @@ Stems are real numbers per hectare in arrays (AGES, lanes); the last row pools a
 
 from sim.jit import compiled, phase, uncompiled
 from sim.mathematics import between, exponential
+from sim.physical_constants import SQUARE_METRES_PER_HECTARE
 
 AGES = 102
 OLDEST = AGES - 1
@@ -63,6 +64,16 @@ def stem_weight(age, rate, shape, exponent) -> float:
     return relative_height(max(age, 1), rate, shape) ** exponent
 
 
+@phase
+def weigh_stems(b, i):
+    """Carbon of a lane's stems by species and age, relative to a very old one: it holds for the year."""
+    p, w = b.p, b.w
+    exponent = p.stem_carbon_exponent[i]
+    for age in range(AGES):
+        w.conifer_size[age, i] = stem_weight(age, p.height_rate_conifer[i], p.height_shape_conifer[i], exponent)
+        w.deciduous_size[age, i] = stem_weight(age, p.height_rate_deciduous[i], p.height_shape_deciduous[i], exponent)
+
+
 @compiled
 def total_weight(stems, lane, youngest, oldest, rate, shape, exponent) -> float:
     """Stems of an age range, each counted by its relative carbon."""
@@ -101,27 +112,109 @@ def kill(b, i, conifers, deciduous):
 
     Returns the stems that died [ha-1], which are booked.
     """
-    s, w, r = b.s, b.w, b.r
     living_conifers, living_deciduous = count_stand(b, i)
     killed = conifers * living_conifers + deciduous * living_deciduous
     dead_conifers, dead_deciduous = fell(b, i, conifers, deciduous)
-    s.soil_carbon[i] += dead_conifers + dead_deciduous
-    w.stems_gain[i] -= killed
-    r.mortality_kgc_m2[i] += dead_conifers + dead_deciduous
+    bury(b, i, killed, dead_conifers + dead_deciduous)
     return killed
 
 
 @compiled
+def bury(b, i, stems, carbon):
+    """Book dead stems [ha-1], and give their carbon [kgC m-2] to the soil."""
+    b.s.soil_carbon[i] += carbon
+    b.w.stems_gain[i] -= stems
+    b.r.dead_stems_ha[i] += stems
+    b.r.mortality_kgc_m2[i] += carbon
+
+
+@compiled
+def weaken(stems, sizes, lane, deaths, suppressed):
+    """Let so many stems of a species die, small ones first, in place: how likely a stem's death is falls with its size
+    as 1 / (suppressed + size), and no age loses more than all its stems.
+
+    sizes : carbon of a stem by age, which never falls with age. Returns the stems that died, and their share of the
+    species' carbon.
+    """
+    number, hazard, carbon = 0.0, 0.0, 0.0
+    for age in range(AGES):
+        number += stems[age, lane]
+        hazard += stems[age, lane] / (suppressed + sizes[age, lane])
+        carbon += stems[age, lane] * sizes[age, lane]
+    if number <= 0.0:
+        return 0.0, 0.0
+    left = deaths
+    doomed = 0  # ages below this one die out; the smallest do so first
+    while doomed < AGES and left >= hazard * (suppressed + sizes[doomed, lane]):
+        left = max(left - stems[doomed, lane], 0.0)
+        hazard = max(hazard - stems[doomed, lane] / (suppressed + sizes[doomed, lane]), 0.0)
+        doomed += 1
+    died, lost = 0.0, 0.0
+    for age in range(AGES):
+        share = 1.0 if age < doomed else min(left / (hazard * (suppressed + sizes[age, lane])), 1.0)
+        dies = share * stems[age, lane]
+        stems[age, lane] -= dies
+        died += dies
+        lost += dies * sizes[age, lane]
+    return died, min(lost / carbon, 1.0)
+
+
+@phase
+def kill_small(b, i, conifers, deciduous):
+    """Let shares of a lane's conifers and deciduous stems die, small ones first; their carbon goes to the soil."""
+    s, p, w = b.s, b.p, b.w
+    living_conifers, living_deciduous = count_stand(b, i)
+    suppressed = p.suppressed_stem_size[i]
+    died, lost = weaken(s.conifer_stems, w.conifer_size, i, conifers * living_conifers, suppressed)
+    carbon = lost * s.conifer_biomass[i]
+    s.conifer_biomass[i] -= carbon
+    bury(b, i, died, carbon)
+    died, lost = weaken(s.deciduous_stems, w.deciduous_size, i, deciduous * living_deciduous, suppressed)
+    carbon = lost * s.deciduous_biomass[i]
+    s.deciduous_biomass[i] -= carbon
+    bury(b, i, died, carbon)
+
+
+@compiled
+def reference_stems(stems, sizes, lane, biomass, reference_kgc, exponent) -> float:
+    """Stems of the reference size that a species' stems crowd like [ha-1]: Reineke's (1933) index, summed over stems,
+    each counted as its carbon over the reference to a power. biomass [kgC m-2], reference_kgc [kgC]."""
+    whole, crowding = 0.0, 0.0
+    for age in range(AGES):
+        if stems[age, lane] > 0.0:
+            whole += stems[age, lane] * sizes[age, lane]
+            crowding += stems[age, lane] * sizes[age, lane] ** exponent
+    if whole <= 0.0:
+        return 0.0
+    return crowding * (SQUARE_METRES_PER_HECTARE * biomass / whole / reference_kgc) ** exponent
+
+
+@phase
+def crowding_stems(b, i):
+    """Both species' stems of a lane as stems of the reference size [ha-1]."""
+    s, p, w = b.s, b.p, b.w
+    reference, exponent = p.reference_stem_kgc[i], p.crowding_exponent[i]
+    conifers = reference_stems(s.conifer_stems, w.conifer_size, i, s.conifer_biomass[i], reference, exponent)
+    return conifers + reference_stems(
+        s.deciduous_stems, w.deciduous_size, i, s.deciduous_biomass[i], reference, exponent
+    )
+
+
+@compiled
 def self_thinning(density, largest_density, threshold, rate) -> float:
-    """Share of stems that crowding kills in a year: 0 below `threshold` of the largest density, `rate` at it."""
+    """Share of stems that crowding kills in a year: 0 below `threshold` of the largest density, `rate` at it.
+
+    density : stems of the reference size that the stand's crowd like [ha-1], at which size the largest density holds.
+    """
     crowding = (density / largest_density - threshold) / (1.0 - threshold)
     return rate * max(crowding, 0.0)
 
 
 @compiled
-def recruits(density, largest_density, rate) -> float:
-    """New seedlings of a year [stems ha-1], limited by the space that is left."""
-    return rate * largest_density * max(1.0 - density / largest_density, 0.0)
+def recruits(density, cover, largest_density, rate, per_stem) -> float:
+    """New seedlings of a year [stems ha-1]: a share of the young stems that fill open ground, where no crown shades it;
+    at most up to the largest density. per_stem : young stems in the place of one of the reference size."""
+    return min(rate * per_stem * largest_density * (1.0 - cover), max(largest_density - density, 0.0))
 
 
 @compiled
@@ -135,7 +228,7 @@ def grow_older(stems, lane):
 
 @phase
 def renew_stems(b, i):
-    """Background mortality and self-thinning, recruitment, ageing."""
+    """Background mortality and self-thinning of small stems first, recruitment in gaps, ageing."""
     s, p, w, d = b.s, b.p, b.w, b.d
     conifers, deciduous = count_stand(b, i)
     density = conifers + deciduous
@@ -143,16 +236,21 @@ def renew_stems(b, i):
         1.0 - p.mortality_spread[i], 1.0 + p.mortality_spread[i], d.mortality_dice[i]
     )
     crowding = self_thinning(
-        density, p.max_natural_density[i], p.density_mortality_threshold[i], p.density_dependent_mortality[i]
+        crowding_stems(b, i),
+        p.max_natural_density[i],
+        p.density_mortality_threshold[i],
+        p.density_dependent_mortality[i],
     )
     conifers_die = min(background * p.mortality_conifer[i] + crowding, 1.0)
     deciduous_die = min(background * p.mortality_deciduous[i] + crowding, 1.0)
-    kill(b, i, conifers_die, deciduous_die)
+    kill_small(b, i, conifers_die, deciduous_die)
 
-    new = recruits(density, p.max_natural_density[i], p.recruitment_rate[i])
+    cover = w.cover_conifer[i] + w.cover_deciduous[i]
+    new = recruits(density, cover, p.max_natural_density[i], p.recruitment_rate[i], p.recruits_per_stem[i])
     seed_source = conifers / density if density > 0.0 else 0.5
     s.conifer_stems[0, i] += new * seed_source
     s.deciduous_stems[0, i] += new * (1.0 - seed_source)
     w.stems_gain[i] += new
+    b.r.recruited_stems_ha[i] = new
     grow_older(s.conifer_stems, i)
     grow_older(s.deciduous_stems, i)

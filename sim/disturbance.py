@@ -8,9 +8,20 @@ from sim.weather import drought_index
 
 
 @compiled
-def fire_hazard(base, conifer, deciduous, flammability_conifer, flammability_deciduous) -> float:
-    """Probability of fire on a summer day that is dry and warm enough, by the cover of each species."""
-    return base * (conifer * flammability_conifer + deciduous * flammability_deciduous)
+def fire_hazard(base, conifer, deciduous, flammability_conifer, flammability_deciduous, flammability_open) -> float:
+    """Probability of fire on a summer day that is dry and warm enough, by the cover of each species; between the
+    crowns the ground vegetation burns."""
+    open_ground = 1.0 - conifer - deciduous
+    return base * (
+        conifer * flammability_conifer + deciduous * flammability_deciduous + open_ground * flammability_open
+    )
+
+
+@compiled
+def ground_fuel(depth, equilibrium) -> float:
+    """Share of the ground layer's fuel that is there: moss and litter grow back after a fire, up to that of open
+    ground. depth, equilibrium : of the organic layer [m]."""
+    return min(depth / equilibrium, 1.0) if equilibrium > 0.0 else 0.0
 
 
 @compiled
@@ -55,6 +66,7 @@ def ignites(b, day, i) -> bool:
         w.cover_deciduous[i],
         p.flammability_conifer[i],
         p.flammability_deciduous[i],
+        p.flammability_open[i] * ground_fuel(s.organic_depth[i], p.organic_depth_open_m[i]),
     )
     summer = p.summer_start_day[i] <= day + 1 < p.summer_end_day[i]
     ready = fire_weather(s.drought[i], w.mean_temperature[i], p.fire_drought_threshold[i], p.fire_temperature_c[i])
@@ -77,6 +89,8 @@ def burn(b, i):
     s.soil_carbon[i] += conifer + deciduous - burned - soil
     r.fire_mortality[i] = killed
     r.fire_mortality_kgc_m2[i] += conifer + deciduous - burned
+    r.burned_trees_kgc_m2[i] += burned
+    r.burned_soil_kgc_m2[i] += soil
     r.fire_loss_kgc_m2[i] += burned + soil
     crown_areas(b, i)
 

@@ -7,7 +7,17 @@ the share that it leaves undone, `missed_share` (`sim.task.objectives`).
 
 import numpy as np
 
-from sim.demography import AGE_CLASSES, OLDEST, class_ages, count, count_stand, first_ages, remove_share, total_weight
+from sim.demography import (
+    AGE_CLASSES,
+    OLDEST,
+    bury,
+    class_ages,
+    count,
+    count_stand,
+    first_ages,
+    remove_share,
+    total_weight,
+)
 from sim.jit import compiled, phase
 
 DENSITY_CHANGES = (-100.0, -50.0, 0.0, 50.0, 100.0)  # stems ha-1
@@ -117,7 +127,7 @@ def manage(b, i):
     r.density_after_action[i] = density
     r.conifer_fraction_after_action[i] = conifers / density if density > 0.0 else 0.0
     if density <= 0.0:
-        bury(b, i)
+        bury_last(b, i)
 
 
 @compiled
@@ -160,11 +170,10 @@ def thin(b, i, conifers, deciduous):
 
 
 @compiled
-def bury(b, i):
-    """Without stems nothing lives: what biomass there was is litter."""
+def bury_last(b, i):
+    """Without stems nothing lives: what biomass there was is dead wood."""
     s = b.s
     dead = s.conifer_biomass[i] + s.deciduous_biomass[i]
     s.conifer_biomass[i] = 0.0
     s.deciduous_biomass[i] = 0.0
-    s.soil_carbon[i] += dead
-    b.r.mortality_kgc_m2[i] += dead
+    bury(b, i, 0.0, dead)

@@ -10,7 +10,7 @@ from statistics import NormalDist
 import numpy as np
 
 from sim import organic, soil
-from sim.demography import AGE_CLASSES, AGES, OLDEST, first_ages
+from sim.demography import AGE_CLASSES, AGES, OLDEST, first_ages, stem_weight
 from sim.jit import uncompiled
 from sim.parameters import SITE_PARAMETERS, check_mapping
 from sim.physical_constants import FREEZING_POINT_K, WATER_DENSITY
@@ -35,14 +35,15 @@ BOUNDARY = "deep_boundary_temperature_k"
 SOIL_CARBONS = ("drawn", "balanced")
 LEAST_SOIL_KGC = 2.0  # the least that the paper draws: ground that has no trees now had some before
 
-#: Ranges that the first stocks are drawn from.
+#: Ranges that the first stocks are drawn from. Biomass is drawn within what the stems can hold, and their age follows
+#: from it, unless `oldest_age_years` is given or a range of it.
 INITIAL_RANGES = {
     "density_stems_ha": (0.0, 600.0),
     "conifer_fraction": (0.2, 0.8),
     "biomass_kgc_m2": (1.0, 10.0),
     "soil_kgc_m2": (2.0, 10.0),
-    "oldest_age_years": (30.0, 110.0),
 }
+DRAWN = (*INITIAL_RANGES, "oldest_age_years")  # a number is drawn for each, whatever is given
 
 #: Stems by species and age class, which can be given instead of density, conifer fraction and oldest age.
 CLASS_NAMES = tuple(f"{species}_{age}_stems_ha" for species in ("conifer", "deciduous") for age in AGE_CLASSES)
@@ -59,8 +60,9 @@ INITIAL_LIMITS = {
     **dict.fromkeys(CLASS_NAMES, (0.0, 10000.0)),
 }
 
-LARGEST_STEM_KGC = 120.0
+LARGEST_STEM_KGC = 120.0  # of the last age, 26 cm thick (Lambert et al. 2005); a stand of sparse old trees has these
 YEARLY_SURVIVAL = 0.975
+COHORT_YEARS = 20  # in which the stems of a first stand came up, as after a fire (Gutsell and Johnson 2002)
 
 
 def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float]:
@@ -81,8 +83,8 @@ def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:
     """Ranges of first stocks, checked like `check_initial`; each a (low, high) pair."""
     checked = {}
     for name, pair in check_mapping("initial_ranges", ranges).items():
-        if name not in INITIAL_RANGES:
-            raise ValueError(f"unknown initial range {name!r}; allowed: {', '.join(INITIAL_RANGES)}")
+        if name not in DRAWN:
+            raise ValueError(f"unknown initial range {name!r}; allowed: {', '.join(DRAWN)}")
         if not isinstance(pair, (tuple, list)) or len(pair) != 2:
             raise ValueError(f"initial range {name}: a (low, high) pair is allowed, got {pair!r}")
         low, high = (check_initial({name: value})[name] for value in pair)
@@ -95,21 +97,28 @@ def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:
 def first_state(parameters: dict, generator: np.random.Generator, given: dict | None, ranges: dict) -> np.ndarray:
     """State vector of a stand before spin-up, shape (fields of `STATE` + ages of both species,).
 
-    parameters : all parameters by name; given : stocks by record name, in place of drawn ones. As many numbers are
-    drawn whatever is given.
+    parameters : all parameters by name; given : stocks by record name, in place of drawn ones; ranges : of the drawn
+    ones, as `INITIAL_RANGES`. As many numbers are drawn whatever is given.
     """
-    stocks = {name: low + (high - low) * generator.random() for name, (low, high) in ranges.items()}
-    stocks.update(given or {})
-    if any(name in CLASS_NAMES for name in stocks):
-        conifers, deciduous = stems_of_classes(stocks, parameters)
-    else:
-        ages = stems_of_ages(stocks["oldest_age_years"]) * stocks["density_stems_ha"]
-        conifers, deciduous = stocks["conifer_fraction"] * ages, (1.0 - stocks["conifer_fraction"]) * ages
-    density = conifers.sum() + deciduous.sum()
-    mix = conifers.sum() / density if density > 0.0 else stocks["conifer_fraction"]
+    dice = {name: generator.random() for name in DRAWN}
+    stocks = drawn_stocks(dice, given or {}, ranges)
     biomass = stocks["biomass_kgc_m2"]
-    if given is None or "biomass_kgc_m2" not in given:
-        biomass = min(biomass, density * LARGEST_STEM_KGC * 1e-4) if density > 0.0 else biomass
+    sizes = stem_sizes(parameters)
+    if any(name in CLASS_NAMES for name in stocks):
+        stems = stems_of_classes(stocks, parameters)
+    else:
+        shares = np.array([stocks["conifer_fraction"], 1.0 - stocks["conifer_fraction"]])
+        if "oldest_age_years" in stocks:
+            ages = stems_of_ages(stocks["oldest_age_years"])
+        else:
+            mean_stem = biomass / (stocks["density_stems_ha"] * 1e-4) if stocks["density_stems_ha"] > 0.0 else 0.0
+            ages = stems_of_size(mean_stem, shares @ sizes)
+        stems = stocks["density_stems_ha"] * shares[:, None] * ages
+    conifers, deciduous = stems
+    density = stems.sum()
+    mix = conifers.sum() / density if density > 0.0 else stocks["conifer_fraction"]
+    carbon = (stems * sizes).sum(axis=1)
+    conifer_biomass = biomass * (carbon[0] / carbon.sum() if density > 0.0 else mix)
 
     crowns = 1.0 - math.exp(-density * 1e-4 * parameters["crown_area_conifer_m2"])
     depth = (
@@ -122,8 +131,8 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
     boundary = parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K
     winter = mean - parameters["seasonal_amplitude_c"]
     state = dict.fromkeys(STATE, 0.0) | {
-        "conifer_biomass": mix * biomass,
-        "deciduous_biomass": (1.0 - mix) * biomass,
+        "conifer_biomass": conifer_biomass,
+        "deciduous_biomass": biomass - conifer_biomass,
         "soil_carbon": stocks["soil_kgc_m2"],
         "products": stocks.get("hwp_kgc_m2", 0.0),
         "organic_depth": depth,
@@ -142,12 +151,68 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
     return np.concatenate([list(state.values()), conifers, deciduous])
 
 
-def stems_of_ages(oldest_age: float) -> np.ndarray:
-    """Shares of stems by age, shape (AGES,): ages 1 to the oldest, fewer by `YEARLY_SURVIVAL` each year."""
+def drawn_stocks(dice: dict, given: dict, ranges: dict) -> dict[str, float]:
+    """First stocks by record name, from uniform numbers by name; biomass within what the stems can hold.
+
+    That is `LARGEST_STEM_KGC` a stem: beyond it the upper end of its range is cut off, and if need be the lower.
+    """
+    stocks = {name: low + (high - low) * dice[name] for name, (low, high) in ranges.items()}
+    stocks.update(given)
+    classes = [stocks[name] for name in CLASS_NAMES if name in stocks]
+    density = sum(classes) if classes else stocks["density_stems_ha"]
+    if "biomass_kgc_m2" not in given and density > 0.0:
+        held = density * LARGEST_STEM_KGC * 1e-4
+        low, high = (min(end, held) for end in ranges["biomass_kgc_m2"])
+        stocks["biomass_kgc_m2"] = low + (high - low) * dice["biomass_kgc_m2"]
+    return stocks
+
+
+def middle_stocks(ranges: dict) -> dict[str, float]:
+    """The stocks in the middle of what is drawn."""
+    return drawn_stocks(dict.fromkeys(DRAWN, 0.5), {}, ranges)
+
+
+def stem_sizes(parameters: dict) -> np.ndarray:
+    """Carbon of a stem by species and age [kgC], shape (2, AGES), `LARGEST_STEM_KGC` at the last age."""
+    weight = uncompiled(stem_weight)
+    sizes = [
+        [
+            weight(
+                age,
+                parameters[f"height_rate_{species}"],
+                parameters[f"height_shape_{species}"],
+                parameters["stem_carbon_exponent"],
+            )
+            for age in range(AGES)
+        ]
+        for species in ("conifer", "deciduous")
+    ]
+    return LARGEST_STEM_KGC * np.array([species / species[-1] for species in np.array(sizes)])
+
+
+def stems_of_ages(oldest_age: float, youngest_age: float = 1) -> np.ndarray:
+    """Shares of stems by age, shape (AGES,): the youngest to the oldest, fewer by `YEARLY_SURVIVAL` each year."""
     ages = np.zeros(AGES)
-    oldest = max(1, int(round(oldest_age)))
-    np.add.at(ages, np.minimum(np.arange(1, oldest + 1), OLDEST), YEARLY_SURVIVAL ** np.arange(oldest))
+    oldest, youngest = (max(1, int(round(age))) for age in (oldest_age, youngest_age))
+    years = np.arange(youngest, oldest + 1)
+    np.add.at(ages, np.minimum(years, OLDEST), YEARLY_SURVIVAL ** (years - youngest))
     return ages / ages.sum()
+
+
+def stems_of_size(mean_kgc: float, sizes: np.ndarray) -> np.ndarray:
+    """Shares of stems by age, shape (AGES,), of a stand that came up in `COHORT_YEARS` and whose mean stem has so much
+    carbon; the youngest or the oldest stand if that is out of reach.
+
+    sizes : carbon of a stem by age [kgC], shape (AGES,).
+    """
+    older = stems_of_ages(1)
+    for oldest in range(2, OLDEST + COHORT_YEARS):
+        younger, older = older, stems_of_ages(oldest, oldest - COHORT_YEARS + 1)
+        small, large = younger @ sizes, older @ sizes
+        if mean_kgc <= large:
+            share = min(max((mean_kgc - small) / (large - small), 0.0), 1.0) if large > small else 1.0
+            return share * older + (1.0 - share) * younger
+    return older
 
 
 def stems_of_classes(stocks: dict, parameters: dict) -> np.ndarray:

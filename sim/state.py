@@ -68,9 +68,14 @@ RECORD = {
     "autotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of the trees"),
     "heterotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of litter and soil"),
     "litterfall_kgc_m2": ("kgC m-2", "litter from living trees to the soil"),
-    "mortality_kgc_m2": ("kgC m-2", "carbon of trees that died of age, crowding or insects, to the soil"),
+    "mortality_kgc_m2": (
+        "kgC m-2",
+        "carbon of trees that died of age, crowding or insects, or was left when the last stem went, to the soil",
+    ),
     "fire_mortality_kgc_m2": ("kgC m-2", "carbon of trees killed by fire and not burned, to the soil"),
     "fire_loss_kgc_m2": ("kgC m-2", "carbon burned, trees and organic layer"),
+    "burned_trees_kgc_m2": ("kgC m-2", "part of it from living trees"),
+    "burned_soil_kgc_m2": ("kgC m-2", "part of it from litter and soil"),
     "harvest_kgc_m2": ("kgC m-2", "carbon of trees cut"),
     "harvest_emission_kgc_m2": ("kgC m-2", "part of it lost at harvest"),
     "hwp_decay_kgc_m2": ("kgC m-2", "carbon lost by decaying products"),
@@ -116,6 +121,8 @@ RECORD = {
     "insect_mortality": ("1", "share of stems killed by insects"),
     "planted_stems_ha": ("stems ha-1", "stems planted"),
     "thinned_stems_ha": ("stems ha-1", "stems cut"),
+    "dead_stems_ha": ("stems ha-1", "stems that died of age, crowding or insects"),
+    "recruited_stems_ha": ("stems ha-1", "seedlings that came by themselves"),
     "density_after_action": ("stems ha-1", "stems after planting and thinning"),
     "conifer_fraction_after_action": ("1", "conifers among them"),
     "harvestable_stems_ha": ("stems ha-1", "stems that could be cut, before the action"),
@@ -129,6 +136,27 @@ RECORD = {
     "carbon_residual_kgc_m2": ("kgC m-2", "largest failure of a step to close"),
     "annual_carbon_residual_kgc_m2": ("kgC m-2", "failure of the year to close, all fluxes"),
     "stems_residual_ha": ("stems ha-1", "failure of the year to close"),
+}
+
+#: What every stock of carbon gains and loses in a year, as columns of the record: stock -> (gains, losses). Nothing
+#: else moves it: its change from a row to the next is the gains less the losses. Recruits and seedlings bring none.
+CARBON_BUDGETS = {
+    "biomass_kgc_m2": (
+        ("gpp_kgc_m2",),
+        (
+            "autotrophic_respiration_kgc_m2",
+            "litterfall_kgc_m2",
+            "mortality_kgc_m2",
+            "fire_mortality_kgc_m2",
+            "burned_trees_kgc_m2",
+            "harvest_kgc_m2",
+        ),
+    ),
+    "soil_kgc_m2": (
+        ("litterfall_kgc_m2", "mortality_kgc_m2", "fire_mortality_kgc_m2"),
+        ("heterotrophic_respiration_kgc_m2", "burned_soil_kgc_m2"),
+    ),
+    "hwp_kgc_m2": (("hwp_stored_kgc_m2",), ("hwp_decay_kgc_m2",)),
 }
 
 #: Daily output: name -> (unit, meaning).
@@ -214,13 +242,14 @@ def block_dtype(lanes: int) -> np.dtype:
     stems = [(f"{species}_stems", "f8", by_age) for species in ("conifer", "deciduous")]
     state = [*((name, "f8", lane) for name in STATE), *stems]
     draws = [(name, "f8", by_day if daily else lane) for name, (daily, *_) in DRAWS.items()]
+    sizes = [(f"{species}_size", "f8", by_age) for species in ("conifer", "deciduous")]
     return np.dtype(
         [
             ("p", parameters),
             ("s", state),
             ("d", draws),
             ("r", [(name, "f8", lane) for name in RECORD]),
-            ("w", [(name, "f8", lane) for name in _WORK]),
+            ("w", [*((name, "f8", lane) for name in _WORK), *sizes]),
         ]
     )
 

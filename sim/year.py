@@ -6,7 +6,7 @@ A pure function of parameters, state, action and the year's random draws, all in
 from sim.account import clear_day, clear_year, end_day, write_record
 from sim.carbon import decay_products, respiration_rates
 from sim.day import begin_day
-from sim.demography import renew_stems
+from sim.demography import renew_stems, weigh_stems
 from sim.disturbance import insects
 from sim.forcing import hour_angles, site_angles, step_weather
 from sim.interception import unloading_rates
@@ -58,6 +58,7 @@ def begin_year(b):
     """1 and 2 of the timeline: the action, and what follows from the stand's structure."""
     for i in range(len(b.s.swe)):
         clear_year(b, i)
+        weigh_stems(b, i)
         manage(b, i)
         site_angles(b, i)
         wind_profiles(b, i)

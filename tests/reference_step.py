@@ -851,6 +851,62 @@ def heterotrophic_respiration(p, s, top):
     return p.soil_respiration / YEAR_S * s.soil_carbon / p.reference_soil_carbon * q10_factor(p, top)
 
 
+# ------------------------------------------------------------------------------------------------------ 12. stems
+
+
+def relative_sizes(p, species):
+    """Carbon of a stem of each year of age, relative to a very old one; a seedling's is that of one year."""
+    years = np.maximum(np.arange(102), 1)
+    height = (1.0 - np.exp(-of(p, "height_rate", species) * years)) ** of(p, "height_shape", species)
+    return height**p.stem_carbon_exponent
+
+
+def reineke_stems(p, s):
+    """Stems of the reference size that the stand crowds like [ha-1]."""
+    crowding = 0.0
+    for species in SPECIES:
+        stems, sizes = getattr(s, f"{species}_stems"), relative_sizes(p, species)
+        if stems.sum() > 0.0:
+            kgc = 1e4 * getattr(s, f"{species}_biomass") / (stems @ sizes) * sizes  # of a stem
+            crowding += stems @ (kgc / p.reference_stem_kgc) ** p.crowding_exponent
+    return crowding
+
+
+def deaths_by_age(p, stems, sizes, number):
+    """Stems of each age that die when so many do: in proportion to 1 / (c + size), found by bisection on the level."""
+    chance = 1.0 / (p.suppressed_stem_size + sizes)
+    low, high = 0.0, 1e3
+    while high - low > 1e-13 * high:
+        level = 0.5 * (low + high)
+        low, high = (level, high) if stems @ np.minimum(level * chance, 1.0) < number else (low, level)
+    return stems * np.minimum(high * chance, 1.0)
+
+
+def renew_stems(p, s):
+    """A year's end without insects, in a year of mean mortality: stems of both species, the carbon that died, and what
+    share of each species' it was.
+
+    The crowns of `s` are those that recruits come up under.
+    """
+    density = sum(getattr(s, f"{species}_stems").sum() for species in SPECIES)
+    crowding = max(reineke_stems(p, s) / p.max_natural_density - p.density_mortality_threshold, 0.0)
+    self_thinning = p.density_dependent_mortality * crowding / (1.0 - p.density_mortality_threshold)
+    gaps = math.exp(-sum(crowns(p, s, species)[0] for species in SPECIES))
+    recruits = p.recruitment_rate * p.recruits_per_stem * p.max_natural_density * gaps
+    recruits = min(recruits, max(p.max_natural_density - density, 0.0))
+    renewed, dead, shares = {}, 0.0, {}
+    for species in SPECIES:
+        stems, sizes = getattr(s, f"{species}_stems"), relative_sizes(p, species)
+        number = min(p.natural_mortality * of(p, "mortality", species) + self_thinning, 1.0) * stems.sum()
+        die = deaths_by_age(p, stems, sizes, number)
+        shares[species] = die @ sizes / (stems @ sizes) if stems.sum() > 0.0 else 0.0
+        dead += shares[species] * getattr(s, f"{species}_biomass")
+        left = stems - die
+        left[0] += recruits * (stems.sum() / density if density > 0.0 else 0.5)
+        renewed[species] = np.array([0.0, *left[:100], left[100] + left[101]])
+    return renewed, dead, shares
+
+
 # ------------------------------------------------------------------------------------------------------- the step
 
 

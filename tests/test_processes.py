@@ -815,13 +815,65 @@ def test_self_thinning_and_recruitment():
     assert demography.self_thinning(1000.0, 2000.0, 0.8, 0.035) == 0.0
     assert demography.self_thinning(1800.0, 2000.0, 0.8, 0.035) == approx(0.0175)
     assert demography.self_thinning(2000.0, 2000.0, 0.8, 0.035) == approx(0.035)
-    assert demography.recruits(0.0, 2000.0, 0.01) == approx(20.0)
-    assert demography.recruits(500.0, 2000.0, 0.01) == approx(15.0)
-    assert demography.recruits(2500.0, 2000.0, 0.01) == 0.0
+    assert demography.recruits(0.0, 0.0, 2000.0, 0.01, 4.0) == approx(80.0)
+    assert demography.recruits(500.0, 0.75, 2000.0, 0.01, 4.0) == approx(20.0)  # in the gaps
+    assert demography.recruits(1990.0, 0.5, 2000.0, 0.01, 4.0) == approx(10.0)  # up to the largest density
+    assert demography.recruits(2500.0, 0.5, 2000.0, 0.01, 4.0) == 0.0
+
+
+SIZES = np.array([[demography.stem_weight(age, 0.0215, 1.2243, 2.5)] for age in range(AGES)])
+
+
+def test_crowding_counts_stems_by_their_size():
+    """Reineke's rule: stems twice as thick crowd like 3.04 times as many, seedlings hardly."""
+    trees, kgc = stems(age70=1000.0), 60.0
+    biomass = 1000.0 * kgc * 1e-4
+    assert demography.reference_stems(trees, SIZES, 0, biomass, kgc, 0.642) == approx(1000.0)
+    thicker = demography.reference_stems(trees, SIZES, 0, biomass * 2.0**2.5, kgc, 0.642)
+    assert thicker == approx(1000.0 * 2.0**1.605)
+    seedlings = trees + stems(age3=5000.0)
+    assert demography.reference_stems(seedlings, SIZES, 0, biomass, kgc, 0.642) == approx(1000.0, rel=0.05)
+    assert demography.reference_stems(stems(), SIZES, 0, 0.0, kgc, 0.642) == 0.0
+
+
+def test_small_stems_die_first():
+    trees = stems(age5=1000.0, age30=500.0, age101=200.0)
+    before = trees.copy()
+    died, lost = demography.weaken(trees, SIZES, 0, 50.0, 0.05)
+    assert died == approx(50.0) and before.sum() - trees.sum() == approx(50.0)
+    share = 1.0 - trees[[5, 30, 101], 0] / before[[5, 30, 101], 0]
+    chances = 1.0 / (0.05 + SIZES[[5, 30, 101], 0])
+    np.testing.assert_allclose(share / share[0], chances / chances[0])
+    assert lost == approx(((before - trees) * SIZES).sum() / (before * SIZES).sum())
+    assert lost < 0.25 * 50.0 / 1700.0
+
+
+def test_an_age_loses_no_more_than_its_stems():
+    trees = stems(age5=10.0, age30=500.0, age101=200.0)
+    died, lost = demography.weaken(trees, SIZES, 0, 400.0, 0.05)
+    assert died == approx(400.0) and trees[5, 0] == 0.0 < trees[30, 0] and 0.0 < lost < 1.0
+    died, lost = demography.weaken(trees, SIZES, 0, trees.sum(), 0.05)
+    assert died == approx(310.0) and trees.sum() == approx(0.0, abs=1e-9) and lost == approx(1.0)
+    assert demography.weaken(stems(), SIZES, 0, 0.0, 0.05) == (0.0, 0.0)
+
+
+@given(st.lists(st.floats(0.0, 5000.0), min_size=6, max_size=6), share, st.floats(0.001, 10.0))
+def test_as_many_stems_die_as_should(numbers, dying, suppressed):
+    trees = stems(**{f"age{age}": number for age, number in zip((0, 1, 12, 40, 80, 101), numbers, strict=True)})
+    before = trees.copy()
+    died, lost = demography.weaken(trees, SIZES, 0, dying * before.sum(), suppressed)
+    round_off = 1e-12 * (1.0 + before.sum())
+    assert died == approx(dying * before.sum(), rel=1e-9, abs=round_off)
+    assert (before - trees).sum() == approx(died, rel=1e-9, abs=round_off)
+    assert trees.min() >= 0.0 and 0.0 <= lost <= 1.0
+    left = np.divide(trees, before, out=np.ones_like(trees), where=before > 1e-6)
+    assert (np.diff(left[before[:, 0] > 1e-6, 0]) >= -1e-9).all()  # the larger, the likelier to live
 
 
 def test_hazards():
-    assert disturbance.fire_hazard(0.0003, 0.5, 0.25, 1.0, 0.2) == approx(0.0003 * 0.55)
+    assert disturbance.fire_hazard(0.0003, 0.5, 0.25, 1.0, 0.2, 0.4) == approx(0.0003 * 0.65)
+    assert disturbance.ground_fuel(0.02, 0.08) == approx(0.25) and disturbance.ground_fuel(0.2, 0.08) == 1.0
+    assert disturbance.ground_fuel(0.0, 0.0) == 0.0
     assert disturbance.fire_weather(31.0, 13.0, 30.0, 12.0)
     assert not disturbance.fire_weather(30.0, 13.0, 30.0, 12.0)
     assert not disturbance.fire_weather(31.0, 12.0, 30.0, 12.0)

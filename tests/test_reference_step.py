@@ -20,11 +20,13 @@ from reference_step import (
     hour_angle,
     observed_weather,
     prepare_day,
+    renew_stems,
     structure,
     sun,
     take_step,
 )
 
+import sim
 import sim.canopy
 from sim.account import clear_day, write_day
 from sim.block import namespace
@@ -352,3 +354,36 @@ def test_old_deciduous_trees_without_crown_development():
     begin_year(b)
     expected = structure(p, state_of(b), 0).light_use["deciduous"]
     assert b.w.light_use_deciduous[0] == approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("crowded", [1.0, 20.0])
+def test_stems_at_the_end_of_a_year(crowded):
+    """Deaths by size, crowding, recruits in gaps and ageing, on sampled sites; `crowded` times their stems."""
+    number = 12
+    constants = {"mortality_spread": 0.0}
+    stands = sim.Stands(
+        number, time_step_minutes=240, constants=constants, mechanisms={"fire": False, "insects": False}
+    )
+    sites = [sim.sample_site(k) for k in range(number)]
+    stands.start(np.arange(number), sites, [sim.episode_seeds(k) for k in range(number)])
+    stands.state[:, -2 * AGES :] *= crowded
+    for _ in range(3):
+        before = stands.state[:, -2 * AGES :].reshape(number, 2, AGES).copy()
+        record = dict(zip(sim.RECORD_NAMES, stands.step(np.full(number, 12)).T, strict=True))
+        after = stands.state[:, -2 * AGES :].reshape(number, 2, AGES)
+        living = stands.state[:, [list(STATE).index(f"{species}_biomass") for species in SPECIES]]
+        for k, site in enumerate(sites):
+            p = SimpleNamespace(**{**site, **stands.constants, **stands.mechanisms})
+            # The carbon of each species before its deaths, by iteration from that after them.
+            biomass = living[k].copy()
+            for _ in range(60):
+                s = SimpleNamespace(
+                    conifer_stems=before[k, 0],
+                    deciduous_stems=before[k, 1],
+                    conifer_biomass=biomass[0],
+                    deciduous_biomass=biomass[1],
+                )
+                stems, dead, shares = renew_stems(p, s)
+                biomass = living[k] / (1.0 - np.array([shares[species] for species in SPECIES]))
+            np.testing.assert_allclose([stems[species] for species in SPECIES], after[k], rtol=1e-9, atol=1e-9)
+            assert record["mortality_kgc_m2"][k] == approx(dead, rel=1e-8)

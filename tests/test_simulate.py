@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 
 import sim
+from sim import spin_up
 from sim.demography import AGES
-from sim.parameters import CONSTANTS, SITE_PARAMETERS, mean_annual_temperature
+from sim.parameters import CONSTANTS, SITE_PARAMETERS, check_constants, check_mechanisms, mean_annual_temperature
 from sim.simulate import check_forcing
 from sim.state import DAILY, FORCING
 
@@ -125,6 +126,59 @@ def test_first_stocks_are_as_given():
     assert table.organic_layer_m[0] == pytest.approx(0.12, abs=0.01)
 
 
+def test_the_age_of_a_first_stand_fits_its_carbon():
+    """Stems of their ages' sizes hold the drawn biomass, and all came up within twenty years of each other."""
+    parameters = {**sim.middle_site(), **check_constants(None), **check_mechanisms(None)}
+    sizes, generator = spin_up.stem_sizes(parameters), np.random.default_rng(1)
+    assert sizes[:, -1] == pytest.approx(120.0)
+    ages, biomass = [], []
+    for _ in range(200):
+        state = spin_up.first_state(parameters, generator, None, sim.INITIAL_RANGES)
+        stems, carbon = state[-2 * AGES :].reshape(2, AGES), state[:2]
+        density = stems.sum()
+        np.testing.assert_allclose((stems * sizes).sum(axis=1) * 1e-4, carbon, rtol=1e-9)
+        assert carbon.sum() <= min(10.0, density * 120.0 * 1e-4) * (1.0 + 1e-12)
+        assert carbon.sum() >= min(1.0, density * 120.0 * 1e-4) * (1.0 - 1e-12)
+        present = np.flatnonzero(stems.sum(axis=0))
+        assert present[-1] - present[0] <= spin_up.COHORT_YEARS
+        ages.append(present[-1])
+        biomass.append(carbon.sum())
+    assert min(ages) < 50 and max(ages) == AGES - 1
+    assert min(biomass) < 1.0 and max(biomass) > 5.0
+
+
+def test_as_much_is_drawn_for_a_first_stand_whatever_is_given():
+    parameters = {**sim.middle_site(), **check_constants(None), **check_mechanisms(None)}
+    given = (
+        None,
+        {"biomass_kgc_m2": 5.0, "density_stems_ha": 400.0},
+        {"oldest_age_years": 80.0},
+        {"conifer_old_stems_ha": 5.0},
+    )
+    ranges = {**sim.INITIAL_RANGES, "oldest_age_years": (50.0, 60.0)}
+    after = []
+    for stocks in given:
+        for drawn_from in (sim.INITIAL_RANGES, ranges):
+            generator = np.random.default_rng(3)
+            spin_up.first_state(parameters, generator, stocks, drawn_from)
+            after.append(generator.random())
+    assert len(set(after)) == 1
+
+
+def test_stems_out_of_reach_are_the_youngest_or_the_oldest():
+    sizes = spin_up.stem_sizes(check_constants(None))[0]
+    oldest, youngest = (spin_up.stems_of_size(kgc, sizes) for kgc in (500.0, 0.0))
+    assert oldest[-1] == pytest.approx(1.0) and youngest[1] == pytest.approx(1.0)
+    between = spin_up.stems_of_size(40.0, sizes)
+    assert between @ sizes == pytest.approx(40.0) and between.sum() == pytest.approx(1.0)
+
+
+def test_the_middle_stand_is_one_that_could_be_drawn():
+    middle = spin_up.middle_stocks(sim.INITIAL_RANGES)
+    assert middle["density_stems_ha"] == 300.0
+    assert middle["biomass_kgc_m2"] == pytest.approx(0.5 * (1.0 + 3.6))  # 3.6 kgC/m2 are 120 kgC a stem
+
+
 def test_a_site_without_stems_keeps_no_living_carbon():
     table = simulate(initial={"density_stems_ha": 0.0, "biomass_kgc_m2": 5.0}, years=2)
     assert table.biomass_kgc_m2[0] == 0.0 and table.mortality_kgc_m2[0] == pytest.approx(5.0)
@@ -141,10 +195,10 @@ def test_any_divisor_of_a_day_is_a_time_step(minutes):
 @pytest.mark.parametrize("mechanism", sim.MECHANISMS)
 def test_every_mechanism_can_be_switched_off(mechanism):
     burning = {"fire_base_probability": 0.05, "fire_drought_threshold": 0.0, "insect_base_probability": 1.0}
-    initial = {"density_stems_ha": 800.0, "biomass_kgc_m2": 8.0}
+    initial = {"density_stems_ha": 8000.0, "biomass_kgc_m2": 8.0}  # so dense that insects come after the fire, too
     site = {**burning, "mean_annual_temperature_c": -8.0}
-    on = simulate(site, initial=initial, years=2)
-    off = simulate(site, initial=initial, years=2, mechanisms={mechanism: False})
+    on = simulate(site, initial=initial, years=2, seed=2)
+    off = simulate(site, initial=initial, years=2, seed=2, mechanisms={mechanism: False})
     assert not on.equals(off)
     if mechanism in ("fire", "insects"):
         column = {"fire": "fire_mortality", "insects": "insect_mortality"}[mechanism]

@@ -1,12 +1,14 @@
 """Observed stands by age and stands that run free: readers, ranges, and arithmetic against values by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 import sim
 from analysis.validation import free_report, stand_development
-from analysis.validation.free_stands import Course, basal_area, grow, stem_weights
+from analysis.validation.free_stands import AFTER_FIRE, Course, basal_area, grow, stem_weights
 from analysis.validation.held_stands import Run
 from sim.state import STATE_NAMES, STATE_SIZE
 
@@ -80,3 +82,11 @@ def test_stands_run_free_and_are_planted():
     density = run.annual["density_stems_ha"]
     assert density.shape == (2, 2) and (density[0] != density[1]).all()
     assert (run.annual["basal_area_m2_ha"] > 20.0).all()
+
+
+def test_a_stand_that_burned_grows_without_fire():
+    run = grow(replace(AFTER_FIRE["after fire"], years=3), 2)
+    burned = run.annual["fire_mortality"]
+    assert (burned[0] >= 0.65).all() and (burned[1:] == 0.0).all()
+    assert (run.annual["biomass_kgc_m2"][0] < 0.4 * 6.0).all()
+    assert (run.annual["recruited_stems_ha"] > 10.0).all()

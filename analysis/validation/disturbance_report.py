@@ -43,7 +43,7 @@ SOURCES = {
     "mortality": "FVS-Alaska: spruce 0.3-0.5, birch 0.7-4.4, aspen 0.9-8.7; CLM6 1.7-2.4; LPJmL 1.5",
 }
 LIKELY = {
-    "fire return": "the hazard grows with cover, and a closed canopy has all of it; most warm days are dry enough",
+    "fire return": "the level of flammability; most warm days are dry enough",
     "share of stems killed": "draw of the share",
     "carbon burned": "depth and density of the organic layer that burns",
     "outbreaks": "winters below the temperature at which insects live",
@@ -82,9 +82,8 @@ class Fires:
 
 
 def mortality(run: Run) -> np.ndarray:
-    """Trees that die a year [%], mean over the years, (sites,): their share of the biomass is that of the stems."""
-    dead = run.annual["mortality_kgc_m2"]
-    return 100.0 * (dead / (run.annual["biomass_kgc_m2"] + dead)).mean(axis=0)
+    """Stems that die a year [%], mean over the years, (sites,)."""
+    return 100.0 * (run.annual["dead_stems_ha"] / run.annual["density_after_action"]).mean(axis=0)
 
 
 def report(sites: int) -> Part:
@@ -116,8 +115,8 @@ that empty the index at once, and between them it soon fills again.
 
 Mortality without fire and insects, {MORTALITY_YEARS} years, of stands of one species; what comes on top at higher
 densities is self-thinning. Alaska's spruces and hardwoods reach full density at 4500-6200 stems/ha with a mean
-diameter of 10 cm, at 1500-2000 with 19-20 cm (Reineke's rule with FVS-Alaska's largest densities): the paper's limit
-of 1500-2000 stems/ha fits large trees only.
+diameter of 10 cm, at 1500-2000 with 19-20 cm (Reineke's rule with FVS-Alaska's largest densities): at that size the
+paper's limit of 1500-2000 stems/ha holds here.
 
 {document.table(mortality_header, mortality_rows, left=6)}"""
     return Part(text, misses=[*fire_misses, *insect_misses, *mortality_misses])

@@ -9,7 +9,7 @@ from gymnasium.spaces import Box
 import sim
 from sim.management import check_actions
 from sim.parameters import check_seed
-from sim.spin_up import check_initial_ranges
+from sim.spin_up import check_initial_ranges, middle_stocks
 from sim.task.actions import MaskFunction, mask_function, unchanged
 from sim.task.checks import check_choice
 from sim.task.objectives import (
@@ -141,7 +141,7 @@ class Episodes:
                 # A fixed world: one site, one start, one weather, one set of disturbance dice.
                 overrides.setdefault("daily_noise_std_c", 0.0)
                 episode_seed = 0 if self.site_seed is None else self.site_seed
-                given[k] = {n: 0.5 * (a + b) for n, (a, b) in {**sim.INITIAL_RANGES, **self.initial_ranges}.items()}
+                given[k] = middle_stocks({**sim.INITIAL_RANGES, **self.initial_ranges})
             if self.site_seed is not None:
                 site_seed = self.site_seed
             fixed_middle = self.mode == "site_specific" and self.site_seed is None
