@@ -121,6 +121,7 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         "swe": 40.0 if winter < 0.0 else 0.0,
         "albedo": parameters["snow_albedo_fresh"],
         "soil_water": 0.7 * parameters["max_water_content_mm"],
+        "acclimation": winter,
     }
     return np.concatenate([list(state.values()), conifers, deciduous])
 

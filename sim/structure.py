@@ -85,7 +85,8 @@ def leaves(b, day):
         green_conifer = p.max_lai_conifer[i]
         green_deciduous = p.max_lai_deciduous[i] * leaf
         area_conifer = green_conifer + p.woody_area_index[i]
-        area_deciduous = green_deciduous + p.max_lai_deciduous[i] * p.leafless_share[i] + p.woody_area_index[i]
+        wood_deciduous = p.woody_area_index[i] * p.woody_area_deciduous[i]
+        area_deciduous = green_deciduous + p.max_lai_deciduous[i] * p.leafless_share[i] + wood_deciduous
         w.optical_conifer[i] = p.light_extinction[i] * area_conifer
         w.optical_deciduous[i] = p.light_extinction[i] * area_deciduous
         w.leaf_conifer[i] = green_conifer / area_conifer
