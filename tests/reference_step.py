@@ -275,7 +275,8 @@ def structure(p, s, day):
         plant = leaf[species] + bare[species]
         stand.share[species] = crown / stand.crowns if stand.crowns > 0.0 else 0.0
         stand.covered[species] = stand.share[species] * stand.cover
-        stand.leaf_share[species] = leaf[species] / plant
+        lit = [1.0 - math.exp(-p.light_extinction * area * p.sky_path) for area in (leaf[species], plant)]
+        stand.leaf_share[species] = lit[0] / max(lit[1], 1e-12)
         stand.depth[species] = p.light_extinction * plant
         stand.lai[species] = leaf[species] * stand.covered[species]
         stand.light_use[species] = of(p, "light_use", species) * (1.0 - old_share * (1.0 - p.light_use_old))

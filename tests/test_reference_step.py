@@ -16,6 +16,7 @@ from reference_step import (
     FUSION,
     SPECIES,
     WATER_DENSITY,
+    acclimated,
     generated_weather,
     hour_angle,
     observed_weather,
