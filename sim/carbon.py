@@ -65,7 +65,7 @@ def litter(b, day):
 
 @compiled
 def move_carbon(b, seconds):
-    """Photosynthesis and respiration, moved between air, trees and soil; what the understorey gains is litter at once."""
+    """Photosynthesis and respiration, moved between air, trees and soil; the understorey's gain is litter at once."""
     s, p, w, r = b.s, b.p, b.w, b.r
     for i in range(len(s.swe)):
         before = s.conifer_biomass[i] + s.deciduous_biomass[i] + s.soil_carbon[i]
