@@ -311,8 +311,8 @@ def _understorey_text(trees: Comparison, both: Comparison) -> str:
         summer = [course.loc[list(SUMMER)].mean() for course in courses]
         values = (summer[0]["measured"], summer[0]["modelled"], summer[1]["modelled"])
         rows.append([f"{name} [{q.unit}]", *(number(value, digits) for value in values)])
-    return f"""The understorey has more leaf area here (0.78, measured) than the trees (0.48). What it adds to the fluxes
-of June to August (trees alone: `tower_stands.US_PRR_TREES_ALONE`):
+    return f"""The understorey has more leaf area here (0.78, measured) than the trees (0.48). What it adds to the
+fluxes of June to August (trees alone: `tower_stands.US_PRR_TREES_ALONE`):
 
 {document.table(["", "measured", "trees alone", "with understorey"], rows)}"""
 
