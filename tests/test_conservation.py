@@ -180,7 +180,7 @@ def test_water_of_every_day(run):
         round_off = 1e-7 + 1e-11 * (d.precipitation_mm + d.evapotranspiration_mm).sum(axis=1)
         assert (held >= -round_off[:, None]).all()
         assert (np.abs(held[:, -1] - store(year.after, ["canopy_rain"])) <= round_off).all()
-        # Rain held: at most 0.2 mm (the constant) on each m2 of leaves and wood, of which there are 13 at most.
+        # Rain held: at most 0.2 mm (the constant) on each m2 of leaves and wood, of which there are 15.8 at most.
         assert held.max() <= 0.2 * 15.8 + 1e-6
 
 
