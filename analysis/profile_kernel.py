@@ -125,7 +125,7 @@ def blocks_at(moments: dict, lanes: int) -> dict[str, tuple]:
     begin_year(block)
     found = {}
     for day in range(1 + max(day for day, _ in moments.values())):
-        begin_day(block, day, observed)
+        begin_day(block, day, hours, observed)
         clear_day(block, day, daily)
         for t in range(STEPS_PER_DAY):
             now = blocks.copy(), day, t, hours

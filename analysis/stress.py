@@ -257,7 +257,8 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
     yield "soil_water", s["soil_water"], 0.0, p["max_water_content_mm"] * rounded
     yield "organic_water", s["organic_water"], 0.0, np.inf
     yield "snow_density", s["snow_density"], p["snow_density_least"] / rounded, np.inf
-    plant_area = p["max_lai_conifer"] + p["max_lai_deciduous"] * (1.0 + p["leafless_share"]) + p["woody_area_index"]
+    wood = p["woody_area_index"] * np.maximum(p["woody_area_deciduous"], 1.0)
+    plant_area = p["max_lai_conifer"] + p["max_lai_deciduous"] * (1.0 + p["leafless_share"]) + wood
     yield "canopy_rain", s["canopy_rain"], 0.0, p["rain_capacity_mm"] * plant_area * rounded
     yield "trunk_capacity", s["trunk_capacity"], LEAST_TRUNK_CAPACITY, np.inf
     yield "snow albedo", s["albedo"], p["snow_albedo_old"] / rounded, p["snow_albedo_fresh"] * rounded
@@ -271,6 +272,8 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         yield name, r[name], 0.0, 1.0
     for name in (
         "litterfall_kgc_m2",
+        "understorey_gpp_kgc_m2",
+        "understorey_litter_kgc_m2",
         "mortality_kgc_m2",
         "fire_mortality_kgc_m2",
         "fire_loss_kgc_m2",

@@ -65,7 +65,7 @@ def litter(b, day):
 
 @compiled
 def move_carbon(b, seconds):
-    """Photosynthesis and respiration, moved between air, trees and soil."""
+    """Photosynthesis and respiration, moved between air, trees and soil; the understorey's gain is litter at once."""
     s, p, w, r = b.s, b.p, b.w, b.r
     for i in range(len(s.swe)):
         before = s.conifer_biomass[i] + s.deciduous_biomass[i] + s.soil_carbon[i]
@@ -78,13 +78,18 @@ def move_carbon(b, seconds):
         soil = min(warmth * w.soil_rate[i] * seconds, 1.0) * s.soil_carbon[i]
         s.conifer_biomass[i] += w.gpp_conifer[i] * seconds - conifer
         s.deciduous_biomass[i] += w.gpp_deciduous[i] * seconds - deciduous
-        s.soil_carbon[i] -= soil
-        gross = (w.gpp_conifer[i] + w.gpp_deciduous[i]) * seconds
+        below = w.gpp_understorey[i] * seconds
+        below_litter = p.understorey_carbon_use[i] * below
+        below_respired = below - below_litter
+        s.soil_carbon[i] += below_litter - soil
+        gross = (w.gpp_conifer[i] + w.gpp_deciduous[i]) * seconds + below
         after = s.conifer_biomass[i] + s.deciduous_biomass[i] + s.soil_carbon[i]
-        failure = abs(after - before - (gross - conifer - deciduous - soil))
+        failure = abs(after - before - (gross - conifer - deciduous - below_respired - soil))
         r.carbon_residual_kgc_m2[i] = max(r.carbon_residual_kgc_m2[i], failure)
         r.gpp_kgc_m2[i] += gross
-        r.autotrophic_respiration_kgc_m2[i] += conifer + deciduous
+        r.autotrophic_respiration_kgc_m2[i] += conifer + deciduous + below_respired
+        r.understorey_gpp_kgc_m2[i] += below
+        r.understorey_litter_kgc_m2[i] += below_litter
         r.heterotrophic_respiration_kgc_m2[i] += soil
 
 

@@ -16,27 +16,29 @@ from sim.weather import SATURATION_AT_FREEZING_HPA, saturation_pressure, saturat
 
 @phase
 def transpiring_leaves(b):
-    """Coefficients of the day's transpiration, by the leaves' share of what the canopy intercepts; vapour density."""
+    """Coefficients of the day's transpiration, by the leaves' share of what the canopy intercepts and by how far they
+    have acclimated; vapour density."""
     p, w = b.p, b.w
     for i in range(len(b.s.swe)):
         cover = w.longwave_cover[i]
         inverse = 1.0 / cover if cover > 0.0 else 0.0
-        conifer = p.priestley_taylor_conifer[i] * w.leaf_conifer[i]
-        deciduous = p.priestley_taylor_deciduous[i] * w.leaf_deciduous[i]
+        inverse *= w.co2_stomata[i]
+        conifer = p.priestley_taylor_conifer[i] * w.leaf_conifer[i] * w.ready_conifer[i]
+        deciduous = p.priestley_taylor_deciduous[i] * w.leaf_deciduous[i] * w.ready_deciduous[i]
         w.transpiration_conifer[i] = conifer * w.sky_conifer[i] * inverse
         w.transpiration_deciduous[i] = deciduous * w.sky_deciduous[i] * inverse
         w.vapour_density[i] = w.air_density[i] * VAPOUR_RATIO / p.air_pressure_hpa[i]
 
 
 @compiled
-def open_stomata(b, i, dry_conifer, dry_deciduous):
-    """Coefficient of transpiration: stomata open in light and above freezing."""
+def open_stomata(b, i):
+    """Coefficient of transpiration: stomata open in light and above freezing, and close as photosynthesis declines."""
     w = b.w
     # A lane in the dark is as in `sim.sunlight.darkness`, whatever its neighbours.
     open_stomata = 1.0 if w.air[i] > 0.0 and w.shortwave[i] > 0.0 else 0.0
-    conifer = w.transpiration_conifer[i] * dry_conifer * w.temperature_stress_conifer[i]
-    deciduous = w.transpiration_deciduous[i] * dry_deciduous * w.temperature_stress_deciduous[i]
-    w.leaf_coefficient[i] = (conifer + deciduous) * w.water_stress[i] * open_stomata
+    conifer = w.transpiration_conifer[i] * min(w.dry_air_conifer[i], w.water_stress[i])
+    deciduous = w.transpiration_deciduous[i] * min(w.dry_air_deciduous[i], w.water_stress[i])
+    w.leaf_coefficient[i] = (conifer + deciduous) * open_stomata
 
 
 @compiled

@@ -196,26 +196,23 @@ def generated_weather(b, day):
             noon,
         )
         w.mean_temperature[i] = temperature
-        w.minimum_temperature[i] = temperature - w.amplitude[i]
         w.precipitation[i] = precipitation
         w.air_density[i] = air_density(p.air_pressure_hpa[i], temperature)
 
 
 @phase
 def observed_weather(b, observed):
-    """What the day's processes need from an observed day: its mean, minimum, precipitation and clearness."""
+    """What the day's processes need from an observed day: its mean, precipitation and clearness."""
     p, w = b.p, b.w
     steps = observed.shape[0]
     for i in range(len(b.s.swe)):
-        mean, minimum, precipitation, received, possible = 0.0, 1e3, 0.0, 0.0, 0.0
+        mean, precipitation, received, possible = 0.0, 0.0, 0.0, 0.0
         for t in range(steps):
             mean += observed[t, 0, i] / steps
-            minimum = min(minimum, observed[t, 0, i])
             precipitation += observed[t, 5, i]
             received += observed[t, 3, i]
             possible += w.extraterrestrial[i] * cos_zenith(w.sun_a[i], w.sun_b[i], math.cos(hour_angle(t, steps)))
         w.mean_temperature[i] = mean
-        w.minimum_temperature[i] = minimum
         w.precipitation[i] = precipitation
         w.diffuse[i] = diffuse_share(min(received / possible, 1.0)) if possible > 0.0 else 1.0
         w.air_density[i] = air_density(p.air_pressure_hpa[i], mean)

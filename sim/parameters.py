@@ -78,10 +78,6 @@ WEATHERS = ("paper", "observed")
 ORDERED_CONSTANTS = (
     ("surface_soil_depth_m", "deep_soil_node_m"),
     ("deep_soil_node_m", "boundary_depth_m"),
-    ("tmin_low_conifer", "tmin_high_conifer"),
-    ("tmin_low_deciduous", "tmin_high_deciduous"),
-    ("vpd_low_hpa", "vpd_high_conifer_hpa"),
-    ("vpd_low_hpa", "vpd_high_deciduous_hpa"),
     ("snow_albedo_old", "snow_albedo_cold"),
     ("snow_albedo_cold", "snow_albedo_fresh"),
     ("fire_kill_low", "fire_kill_high"),

@@ -25,3 +25,4 @@ SECONDS_PER_DAY = 86400.0
 DAYS_PER_YEAR = 365  # there are no leap years
 SECONDS_PER_YEAR = DAYS_PER_YEAR * SECONDS_PER_DAY
 MJ_PER_DAY = SECONDS_PER_DAY / 1e6  # MJ m-2 day-1 of 1 W m-2
+PHOTONS_PER_MEGAJOULE = 4.57  # mol, of photosynthetically active sunlight (McCree 1972)

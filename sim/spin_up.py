@@ -147,6 +147,7 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         "snow_density": FIRST_SNOW_DENSITY,
         "albedo": parameters["snow_albedo_fresh"],
         "soil_water": 0.7 * parameters["max_water_content_mm"],
+        "acclimation": winter,
     }
     return np.concatenate([list(state.values()), conifers, deciduous])
 

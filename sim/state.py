@@ -37,6 +37,7 @@ STATE = {
     "canopy_snow": ("mm", "snow held by the canopy"),
     "soil_water": ("mm", "water in the soil bucket"),
     "drought": ("mm", "running drought index"),
+    "acclimation": ("degC", "temperature that photosynthesis is acclimated to"),
 }
 
 #: A year's random numbers: name -> (per day?, distribution, the stream that they are from).
@@ -64,10 +65,12 @@ RECORD = {
     "biomass_kgc_m2": ("kgC m-2", "living trees at the year's end"),
     "soil_kgc_m2": ("kgC m-2", "litter and soil at the year's end"),
     "hwp_kgc_m2": ("kgC m-2", "stock of wood products at the year's end"),
-    "gpp_kgc_m2": ("kgC m-2", "gross primary production"),
-    "autotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of the trees"),
+    "gpp_kgc_m2": ("kgC m-2", "gross primary production, of trees and understorey"),
+    "autotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of trees and understorey"),
     "heterotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of litter and soil"),
     "litterfall_kgc_m2": ("kgC m-2", "litter from living trees to the soil"),
+    "understorey_gpp_kgc_m2": ("kgC m-2", "gross primary production of the understorey alone"),
+    "understorey_litter_kgc_m2": ("kgC m-2", "its net production, all of it litter, to the soil"),
     "mortality_kgc_m2": (
         "kgC m-2",
         "carbon of trees that died of age, crowding or insects, or was left when the last stem went, to the soil",
@@ -96,7 +99,7 @@ RECORD = {
     "net_radiation_mj_m2": ("MJ m-2", "net radiation of the stand"),
     "sensible_heat_mj_m2": ("MJ m-2", "sensible heat to the air"),
     "latent_heat_mj_m2": ("MJ m-2", "latent heat to the air"),
-    "ground_shortwave_mj_m2": ("MJ m-2", "shortwave absorbed by ground and snow"),
+    "ground_shortwave_mj_m2": ("MJ m-2", "shortwave absorbed by ground and snow, less what the understorey stores"),
     "air_temperature_c": ("degC", "annual mean"),
     "ground_temperature_c": ("degC", "annual mean of snow surface or skin"),
     "soil_top_temperature_c": ("degC", "annual mean at the top of the mineral soil"),
@@ -163,8 +166,8 @@ CARBON_BUDGETS = {
 DAILY = {
     "air_temperature_c": ("degC", "mean"),
     "precipitation_mm": ("mm", "rain and snow"),
-    "gpp_kgc_m2": ("kgC m-2", "gross primary production"),
-    "autotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of the trees"),
+    "gpp_kgc_m2": ("kgC m-2", "gross primary production, of trees and understorey"),
+    "autotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of trees and understorey"),
     "heterotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of litter and soil"),
     "shortwave_mj_m2": ("MJ m-2", "incoming shortwave"),
     "net_radiation_mj_m2": ("MJ m-2", "net radiation of the stand"),
@@ -206,23 +209,25 @@ _WORK = """
 above_deep_node advected air air_density air_emission air_sum amplitude anomaly bare_gain biomass_before
 boundary_conductance canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum canopy_sw cos_latitude cos_peak
 cos_warmest cos_zenith cover_conifer cover_deciduous crown_area deep deep_base deep_by_surface deep_conductance
-deep_frozen deep_latent deep_sum deep_thawed deficit density_change diffuse dry_coefficient dryness_conifer
-dryness_deciduous emissivity energy_before energy_gain extraterrestrial first_cut_age fixed frozen_ratio gpp_conifer
+deep_frozen deep_latent deep_sum deep_thawed deficit density_change diffuse dry_coefficient
+emissivity energy_before energy_gain extraterrestrial first_cut_age fixed frozen_ratio gpp_conifer
 gpp_deciduous ground_base ground_by_canopy ground_by_emission ground_conductance ground_exchange ground_latent
 ground_log ground_new ground_sum ground_sw ground_velocity ground_wind half_surface high humidity infiltration
 lai_conifer lai_deciduous latent_slope leaf_coefficient leaf_conifer leaf_deciduous leaf_rate light_use_conifer
-light_use_deciduous log_q10 longwave_cover low mean_temperature melt_span minimum_temperature mix net optical_conifer
+light_use_deciduous log_q10 longwave_cover low mean_temperature melt_span mix net optical_conifer
 optical_deciduous per_below_deep_node per_rain_capacity precipitation precipitation_step products_before products_decay
 rain rain_capacity reflected reflected_sum residual saturation_slope share_conifer shortwave shortwave_sum sin_latitude
 sin_peak sin_warmest sky sky_conifer sky_deciduous snow snow_area snow_efficiency snow_hiding
 snow_log snow_resistance snow_wind soil_before soil_heat_sum soil_rate soil_top stems_before stems_gain summer_down
 summer_up sun_a sun_b surface surface_base surface_conductance surface_frozen surface_latent
-surface_sum surface_thawed temperature_stress_conifer temperature_stress_deciduous thaw_seconds thaw_warmth
+surface_sum surface_thawed thaw_seconds thaw_warmth
 top_of_canopy top_sum transpiration_conifer transpiration_deciduous trial trunk_air trunk_base trunk_by_canopy
 trunk_by_ground trunk_canopy trunk_ground unloading_rate upper_soil vapour vapour_density water_before water_gain
 water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
 floor_water layer_share organic organic_base organic_by_ground organic_conductance organic_sum surface_by_organic
 thaw_water wind
+co2_growth co2_stomata dry_air_conifer dry_air_deciduous efficiency_conifer efficiency_deciduous efficiency_understorey
+gpp_understorey photons ready_conifer ready_deciduous
 """.split()
 
 

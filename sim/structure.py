@@ -29,6 +29,14 @@ def leaf_out(day, start, spring_rate, fall, autumn_rate) -> float:
     return spring * autumn
 
 
+@compiled
+def leaf_share(depth, green, path) -> float:
+    """Leaves' share of the light that a crown intercepts, where leaves hide the wood (Kucharik et al. 1998); depth :
+    optical depth of leaves and wood; green : leaves' share of their area; path : in vertical thicknesses."""
+    leaves = 1.0 - exponential(-green * depth * path)
+    return leaves / max(1.0 - exponential(-depth * path), 1e-12)
+
+
 @phase
 def crown_areas(b, i):
     """Crown area, cover and light use of a lane's stand, from its stems by age (crowns overlap at random)."""
@@ -85,11 +93,12 @@ def leaves(b, day):
         green_conifer = p.max_lai_conifer[i]
         green_deciduous = p.max_lai_deciduous[i] * leaf
         area_conifer = green_conifer + p.woody_area_index[i]
-        area_deciduous = green_deciduous + p.max_lai_deciduous[i] * p.leafless_share[i] + p.woody_area_index[i]
+        wood_deciduous = p.woody_area_index[i] * p.woody_area_deciduous[i]
+        area_deciduous = green_deciduous + p.max_lai_deciduous[i] * p.leafless_share[i] + wood_deciduous
         w.optical_conifer[i] = p.light_extinction[i] * area_conifer
         w.optical_deciduous[i] = p.light_extinction[i] * area_deciduous
-        w.leaf_conifer[i] = green_conifer / area_conifer
-        w.leaf_deciduous[i] = green_deciduous / area_deciduous
+        w.leaf_conifer[i] = leaf_share(w.optical_conifer[i], green_conifer / area_conifer, p.sky_path[i])
+        w.leaf_deciduous[i] = leaf_share(w.optical_deciduous[i], green_deciduous / area_deciduous, p.sky_path[i])
         w.lai_conifer[i] = green_conifer * w.cover_conifer[i]
         w.lai_deciduous[i] = green_deciduous * w.cover_deciduous[i]
         w.snow_area[i] = w.cover_conifer[i] * area_conifer + w.cover_deciduous[i] * area_deciduous

@@ -2,9 +2,10 @@
 
 from sim.evaporation import open_stomata
 from sim.jit import compiled
-from sim.photosynthesis import assimilate, dry_air_stress, energy_of_photosynthesis
+from sim.photosynthesis import assimilate, energy_stored
 from sim.radiation import canopy_interception, path_length, shortwave
 from sim.snow import surface_albedo
+from sim.understorey import assimilate_below
 
 
 @compiled
@@ -18,14 +19,16 @@ def any_sun(b):
 
 @compiled
 def sunlight(b):
-    """Shortwave absorbed by canopy and ground, photosynthesis, and how far stomata open."""
-    w = b.w
+    """Shortwave absorbed by canopy and ground, photosynthesis, and how far stomata open. What the understorey stores of
+    the light is no more the ground's."""
+    p, w = b.p, b.w
     for i in range(len(b.s.swe)):
         light_conifer, light_deciduous = absorb(b, i)
-        dry_conifer, dry_deciduous = dry_air_stress(b, i)
-        assimilate(b, i, light_conifer, light_deciduous, dry_conifer, dry_deciduous)
-        w.fixed[i] = energy_of_photosynthesis(b, i)
-        open_stomata(b, i, dry_conifer, dry_deciduous)
+        assimilate(b, i, light_conifer, light_deciduous)
+        assimilate_below(b, i, w.shortwave[i] - light_conifer - light_deciduous)
+        w.fixed[i] = energy_stored(w.gpp_conifer[i] + w.gpp_deciduous[i], p.photosynthesis_energy[i])
+        w.ground_sw[i] -= energy_stored(w.gpp_understorey[i], p.photosynthesis_energy[i])
+        open_stomata(b, i)
 
 
 @compiled
@@ -61,5 +64,6 @@ def darkness(b):
         w.reflected[i] = 0.0
         w.gpp_conifer[i] = 0.0
         w.gpp_deciduous[i] = 0.0
+        w.gpp_understorey[i] = 0.0
         w.fixed[i] = 0.0
         w.leaf_coefficient[i] = 0.0

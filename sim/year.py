@@ -14,7 +14,7 @@ from sim.jit import phase
 from sim.management import manage
 from sim.organic import renew_organic_layer
 from sim.permafrost import add_upper_ground
-from sim.photosynthesis import dryness_slopes
+from sim.photosynthesis import carbon_dioxide
 from sim.physical_constants import SECONDS_PER_DAY
 from sim.snow import settle_snow
 from sim.soil import soil_nodes
@@ -42,7 +42,7 @@ def simulate_year(block, steps_per_day, days, observed, daily):
     hours = hour_angles(steps_per_day)
     for day in range(days):
         today = observed[day * steps_per_day : (day + 1) * steps_per_day]
-        begin_day(b, day, today)
+        begin_day(b, day, hours, today)
         clear_day(b, day, daily)
         for t in range(steps_per_day):
             step_weather(b, t, hours, seconds, today)
@@ -64,7 +64,7 @@ def begin_year(b):
         wind_profiles(b, i)
         respiration_rates(b, i)
         soil_nodes(b, i)
-        dryness_slopes(b, i)
+        carbon_dioxide(b, i)
         unloading_rates(b, i)
         crown_areas(b, i)
         grow_trunk(b, i)

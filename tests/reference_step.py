@@ -186,7 +186,6 @@ def generated_weather(p, day, yesterday, noise, dice, amount, windiness):
         anomaly=anomaly,
         mean=mean,
         amplitude=amplitude,
-        minimum=mean - amplitude,
         precipitation=precipitation,
         vapour=vapour,
         emissivity=sky_emissivity(mean, vapour, cloud),
@@ -202,9 +201,7 @@ def observed_weather(p, day, rows):
     suns = [sun(p, day, hour_angle(step, len(rows))) for step in range(len(rows))]
     possible = sum(sine * extraterrestrial for sine, extraterrestrial in suns)
     clearness = min(rows[:, 3].sum() / possible, 1.0) if possible > 0.0 else 0.0
-    return SimpleNamespace(
-        mean=rows[:, 0].mean(), minimum=rows[:, 0].min(), diffuse=diffuse_share(clearness), rows=rows
-    )
+    return SimpleNamespace(mean=rows[:, 0].mean(), diffuse=diffuse_share(clearness), rows=rows)
 
 
 def hour_angle(step, steps_per_day):
@@ -288,7 +285,8 @@ def structure(p, s, day):
     """Crowns, cover, leaves and optical depths."""
     out = leaf_out(p, day)
     leaf = {"conifer": p.max_lai_conifer, "deciduous": out * p.max_lai_deciduous}
-    bare = {"conifer": p.woody_area_index, "deciduous": p.leafless_share * p.max_lai_deciduous + p.woody_area_index}
+    wood = {"conifer": p.woody_area_index, "deciduous": p.woody_area_deciduous * p.woody_area_index}
+    bare = {"conifer": wood["conifer"], "deciduous": p.leafless_share * p.max_lai_deciduous + wood["deciduous"]}
     stand = SimpleNamespace(share={}, covered={}, leaf_share={}, depth={}, lai={}, light_use={}, plant_area=0.0)
     area = {species: crowns(p, s, species) for species in SPECIES}
     stand.crowns = sum(crown for crown, _ in area.values())
@@ -298,7 +296,8 @@ def structure(p, s, day):
         plant = leaf[species] + bare[species]
         stand.share[species] = crown / stand.crowns if stand.crowns > 0.0 else 0.0
         stand.covered[species] = stand.share[species] * stand.cover
-        stand.leaf_share[species] = leaf[species] / plant
+        lit = [1.0 - math.exp(-p.light_extinction * area * p.sky_path) for area in (leaf[species], plant)]
+        stand.leaf_share[species] = lit[0] / max(lit[1], 1e-12)
         stand.depth[species] = p.light_extinction * plant
         stand.lai[species] = leaf[species] * stand.covered[species]
         stand.light_use[species] = of(p, "light_use", species) * (1.0 - old_share * (1.0 - p.light_use_old))
@@ -306,16 +305,36 @@ def structure(p, s, day):
     return stand
 
 
-def prepare_day(p, s, day, weather):
-    """What holds for the day: weather, structure, density of the air, and the snow that lies in the morning."""
+def prepare_day(p, s, day, weather, steps_per_day):
+    """What holds for the day: weather, its mean light [W m-2] and deficit [kPa], structure, density of the air, and
+    the snow that lies in the morning."""
+    rows = weather.rows
+    if rows is None:
+        suns = [sun(p, day, hour_angle(step, steps_per_day)) for step in range(steps_per_day)]
+        shortwave = weather.clearness * np.mean([sine * extraterrestrial for sine, extraterrestrial in suns])
+        swings = weather.amplitude * np.cos([math.pi / 4.0, 3.0 * math.pi / 4.0])
+        deficits = [saturation_pressure(weather.mean + swing) - weather.vapour for swing in swings]
+    else:
+        shortwave = rows[:, 3].mean()
+        deficits = [
+            saturation_pressure(celsius) - humidity * saturation_pressure_water(celsius)
+            for celsius, humidity in rows[:, :2]
+        ]
     return SimpleNamespace(
         number=day,
         weather=weather,
+        shortwave=shortwave,
+        deficit_kpa=0.1 * np.mean([max(deficit, 0.0) for deficit in deficits]),
         stand=structure(p, s, day),
         air_density=air_density(p, weather.mean),
         snow=s.swe,
         snow_density=s.snow_density,
     )
+
+
+def acclimated(p, before, weather):
+    """Acclimated temperature of the day, from that of the day before [degC]."""
+    return before + (weather.mean - before) / p.acclimation_days
 
 
 # --------------------------------------------------------------------------------------------------- 5. radiation
@@ -423,14 +442,21 @@ def water_stress(p, s, seconds):
     return min(1.0, s.soil_water / (p.water_stress_threshold * p.max_water_content_mm + 4e-4 * seconds))
 
 
-def deficit_stress(p, air, species):
-    """f_D."""
-    return 1.0 - ramp(air.deficit, p.vpd_low_hpa, of(p, "vpd_high", species, "_hpa"))
+def openness(p, s, today, species, seconds):
+    """f_E: dry air or dry soil, whichever limits more."""
+    dry_air = math.exp(-of(p, "dry_air", species) * today.deficit_kpa)
+    return min(dry_air, water_stress(p, s, seconds))
 
 
-def temperature_stress(p, today, species):
-    """f_T and f_min."""
-    return ramp(today.weather.minimum, of(p, "tmin_low", species), of(p, "tmin_high", species))
+def readiness(p, s, species):
+    """f_S."""
+    start, span = of(p, "acclimation_start", species, "_c"), of(p, "acclimation_span", species, "_k")
+    return ramp(s.acclimation, start, start + span)
+
+
+def co2_response(p, gain):
+    """Of photosynthesis or transpiration."""
+    return max(1.0 + gain * (math.log(p.co2_ppm) - math.log(380.0)), 0.0)
 
 
 def equilibrium(air):
@@ -447,11 +473,11 @@ def evaporation_coefficients(p, s, air, today, rays, wet, seconds):
             * today.stand.leaf_share[species]
             * rays.sky[species]
             / rays.cover
-            * deficit_stress(p, air, species)
-            * temperature_stress(p, today, species)
+            * openness(p, s, today, species, seconds)
+            * readiness(p, s, species)
             for species in SPECIES
         )
-        dry = (1.0 - wet) * equilibrium(air) * water_stress(p, s, seconds) * leaves
+        dry = (1.0 - wet) * equilibrium(air) * co2_response(p, p.co2_transpiration) * leaves
     wetted = wet * equilibrium(air) * p.priestley_taylor_wet
     both = max(dry + wetted, 1.0)
     return dry / both, wetted / both
@@ -821,11 +847,32 @@ class EnergyBalance:
 # ----------------------------------------------------------------------------------------------------- 11. carbon
 
 
-def photosynthesis(p, s, air, today, rays, species, seconds):
+def photons(p, shortwave):
+    """mol m-2 s-1 in shortwave [W m-2]."""
+    return 4.57e-6 * p.par_fraction * shortwave
+
+
+def light_use_of_day(p, s, today, species):
+    """gC mol-1, before dry air or soil; s : state after the morning."""
+    saturated = 1.0 + of(p, "light_saturation", species) * 86400.0 * photons(p, today.shortwave)
+    return co2_response(p, p.co2_photosynthesis) * readiness(p, s, species) / saturated
+
+
+def photosynthesis(p, s, today, rays, species, seconds):
     """GPP [kgC m-2 s-1]."""
-    used = p.par_fraction * rays.intercepted[species] * today.stand.leaf_share[species]
-    stress = temperature_stress(p, today, species) * deficit_stress(p, air, species) * water_stress(p, s, seconds)
-    return 1e-9 * used * today.stand.light_use[species] * stress
+    absorbed = photons(p, rays.intercepted[species]) * today.stand.leaf_share[species]
+    efficiency = today.stand.light_use[species] * light_use_of_day(p, s, today, species)
+    return 1e-3 * absorbed * efficiency * openness(p, s, today, species, seconds)
+
+
+def understorey_photosynthesis(p, s, air, today, rays, seconds):
+    """The same of the understorey, where it is out of the morning's snow."""
+    depth = today.snow / today.snow_density
+    area = p.understorey_lai * max(1.0 - depth / p.understorey_height_m, 0.0)
+    below = max(air.shortwave - sum(rays.intercepted.values()), 0.0)
+    absorbed = photons(p, below) * (1.0 - math.exp(-p.light_extinction * p.sky_path * area))
+    efficiency = p.light_use_understorey * light_use_of_day(p, s, today, "conifer")
+    return 1e-3 * absorbed * efficiency * openness(p, s, today, "conifer", seconds)
 
 
 def q10_factor(p, celsius):
@@ -920,7 +967,9 @@ def take_step(p, s, today, step, steps_per_day):
     stand = today.stand
     air = air_of_step(p, today, step, steps_per_day)
     rays = shortwave(p, air, today.weather.diffuse, stand, surface_albedo(p, s, today.snow_density))
-    gpp = {species: photosynthesis(p, s, air, today, rays, species, seconds) for species in SPECIES}
+    gpp = {species: photosynthesis(p, s, today, rays, species, seconds) for species in SPECIES}
+    gpp_below = understorey_photosynthesis(p, s, air, today, rays, seconds)
+    stored_below = 1000.0 * p.photosynthesis_energy * gpp_below
 
     h_canopy = canopy_exchange(p, air, today, rays.cover)
     aloft = canopy_snow(p, s, air, today, rays, h_canopy, seconds)
@@ -955,7 +1004,7 @@ def take_step(p, s, today, step, steps_per_day):
         cover=rays.cover,
         emissivity=p.ground_emissivity,
         canopy_shortwave=rays.canopy,
-        ground_shortwave=rays.ground,
+        ground_shortwave=rays.ground - stored_below,
         growth=1000.0 * p.photosynthesis_energy * sum(gpp.values()),
         canopy_snow=(FUSION * aloft.melted + SUBLIMATION * aloft.sublimated) / seconds,
         dry=dry,
@@ -1024,7 +1073,7 @@ def take_step(p, s, today, step, steps_per_day):
     state = {
         "conifer_biomass": s.conifer_biomass + seconds * (gpp["conifer"] - respiration["conifer"]),
         "deciduous_biomass": s.deciduous_biomass + seconds * (gpp["deciduous"] - respiration["deciduous"]),
-        "soil_carbon": s.soil_carbon - seconds * decay,
+        "soil_carbon": s.soil_carbon + seconds * (p.understorey_carbon_use * gpp_below - decay),
         "products": s.products,
         "organic_depth": s.organic_depth,
         "canopy": canopy,
@@ -1042,11 +1091,15 @@ def take_step(p, s, today, step, steps_per_day):
         "canopy_snow": aloft.store,
         "soil_water": water - runoff,
         "drought": s.drought,
+        "acclimation": s.acclimation,
     }
     megajoules = 1e-6 * seconds
     fluxes = {
-        "gpp_kgc_m2": seconds * sum(gpp.values()),
-        "autotrophic_respiration_kgc_m2": seconds * sum(respiration.values()),
+        "gpp_kgc_m2": seconds * (sum(gpp.values()) + gpp_below),
+        "autotrophic_respiration_kgc_m2": seconds
+        * (sum(respiration.values()) + (1.0 - p.understorey_carbon_use) * gpp_below),
+        "understorey_gpp_kgc_m2": seconds * gpp_below,
+        "understorey_litter_kgc_m2": seconds * p.understorey_carbon_use * gpp_below,
         "heterotrophic_respiration_kgc_m2": seconds * decay,
         "precipitation_mm": air.precipitation,
         "snowfall_mm": air.snow,
@@ -1057,11 +1110,11 @@ def take_step(p, s, today, step, steps_per_day):
         "sublimation_mm": vapour + aloft.sublimated,
         "canopy_sublimation_mm": aloft.sublimated,
         "shortwave_mj_m2": megajoules * air.shortwave,
-        "net_radiation_mj_m2": megajoules * (canopy_net + ground_net),
+        "net_radiation_mj_m2": megajoules * (canopy_net + ground_net + stored_below),
         "sensible_heat_mj_m2": megajoules * sensible,
         "latent_heat_mj_m2": megajoules * latent,
         "ground_heat_mj_m2": megajoules * g_go * (ground - organic),
-        "ground_shortwave_mj_m2": megajoules * rays.ground,
+        "ground_shortwave_mj_m2": megajoules * (rays.ground - stored_below),
         "boundary_warming_mj_m2": megajoules * max(into_boundary, 0.0),
         "boundary_cooling_mj_m2": megajoules * max(-into_boundary, 0.0),
         "deep_heat_gain_mj_m2": megajoules * deep_gain,

@@ -49,8 +49,8 @@ BAD_ARGUMENTS = {
     "unknown constant": ({"constants": {"par": 1}}, r"unknown constant 'par'"),
     "constant beyond limits": ({"constants": {"reference_lai": 99}}, r"reference_lai = 99 is outside .*\[0.5, 10\]"),
     "constants out of order": (
-        {"constants": {"vpd_low_hpa": 20.0, "vpd_high_conifer_hpa": 5.0}},
-        r"vpd_low_hpa = 20 .*vpd_high_conifer_hpa = 5",
+        {"constants": {"insect_lethal_c": -10.0, "insect_mild_c": -20.0}},
+        r"insect_lethal_c = -10 .*insect_mild_c = -20",
     ),
     "unknown group": (
         {"observation_groups": ("weather",)},

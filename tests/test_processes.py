@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from numba.core.dispatcher import Dispatcher
 from pytest import approx
 
+import sim
 import sim.canopy
 import sim.carbon
 import sim.demography
@@ -30,6 +31,7 @@ import sim.response
 import sim.snow
 import sim.soil
 import sim.structure
+import sim.understorey
 import sim.water
 import sim.weather
 import sim.wind
@@ -47,6 +49,7 @@ disturbance, evaporation, organic = map(plain, (sim.disturbance, sim.evaporation
 interception, management, mathematics = map(plain, (sim.interception, sim.management, sim.mathematics))
 photosynthesis, radiation, response = map(plain, (sim.photosynthesis, sim.radiation, sim.response))
 permafrost, snow, soil, structure = map(plain, (sim.permafrost, sim.snow, sim.soil, sim.structure))
+understorey = plain(sim.understorey)
 water, weather, wind = map(plain, (sim.water, sim.weather, sim.wind))
 
 share = st.floats(0.0, 1.0)
@@ -593,11 +596,6 @@ def test_aerodynamic_conductance():
     assert wind.aerodynamic_conductance(0.0, 1.5, 10.0, 2.0) == 0.0
 
 
-def test_stress_ramp():
-    stress = [photosynthesis.stress_ramp(v, -8.0, 1.0 / 16.0) for v in (-20.0, -8.0, 0.0, 8.0, 20.0)]
-    assert stress == [0.0, 0.0, 0.5, 1.0, 1.0]
-
-
 @pytest.mark.parametrize("melt_span", [0.0, 2.0, 1e3], ids=["no snow", "melts out", "deep snow"])
 @pytest.mark.parametrize("trial", [-15.0, 2.0, 18.0])
 def test_slope_of_the_canopy_balance_is_its_derivative(trial, melt_span):
@@ -686,11 +684,63 @@ def test_newton_knows_the_curvature_of_the_emission():
 # ----------------------------------------------------------------------------------------------------- carbon
 
 
-def test_photosynthesis_of_mod17():
-    # 100 W m-2 for a day are 8.64 MJ, of which 45 % are PAR: 3.888 MJ x 1.2 gC MJ-1 = 4.67 gC.
-    a_day = 86400.0 * photosynthesis.photosynthesis(100.0, 1.0, 1.2, 0.45, 1.0, 1.0, 1.0)
-    assert a_day == approx(4.6656e-3)
-    assert 86400.0 * photosynthesis.photosynthesis(100.0, 0.5, 1.2, 0.45, 0.5, 0.5, 0.5) == approx(a_day / 16.0)
+def preles_gpp(photons, absorbed, deficit_kpa, acclimation):
+    """A day of PRELES as published, gC m-2, with the parameters of Minunno et al. (2016) in 380 ppm."""
+    season = min(max(acclimation + 3.063, 0.0) / 17.72, 1.0)
+    return 0.7457 * photons * absorbed * season * math.exp(-0.1027 * deficit_kpa) / (0.03673 * photons + 1.0)
+
+
+@pytest.mark.parametrize("celsius", [-8.0, 2.0, 14.0])
+def test_a_day_of_photosynthesis_is_that_of_preles(celsius):
+    """The steps of a day add up to what PRELES has for it, whatever the course of the light."""
+    light = np.maximum(np.sin(np.linspace(-1.0, 4.0, 48)), 0.0) * 600.0
+    rows = np.tile([celsius, 0.6, 2.0, 0.0, 300.0, 0.0], (48, 1))
+    rows[:, 3] = light
+    constants = {name: [constant.low] for name, constant in sim.CONSTANTS.items()} | {"co2_ppm": [380.0]}
+    state = SimpleNamespace(swe=[0.0], acclimation=[celsius])
+    work = {"mean_temperature": [celsius], "water_stress": [1.0], "leaf_conifer": [0.9], "leaf_deciduous": [0.9]}
+    work |= {f"light_use_{species}": constants[f"light_use_{species}"] for species in ("conifer", "deciduous")}
+    answers = "co2_growth co2_stomata ready_conifer ready_deciduous dry_air_conifer dry_air_deciduous gpp_conifer"
+    answers += " efficiency_conifer efficiency_deciduous efficiency_understorey gpp_deciduous"
+    work |= {name: [0.0] for name in answers.split()}
+    b = SimpleNamespace(p=SimpleNamespace(**constants), s=state, w=SimpleNamespace(**work))
+    photosynthesis.carbon_dioxide(b, 0)
+    photosynthesis.light_use(b, np.zeros((48, 2)), rows[:, :, None])
+    gross = 0.0
+    for shortwave in light:
+        photosynthesis.assimilate(b, 0, 0.8 * shortwave, 0.0)
+        gross += 1800.0 * b.w.gpp_conifer[0]
+    photons = 4.57e-6 * 0.45 * 1800.0 * light.sum()
+    deficit = 0.1 * (weather.saturation_pressure(celsius) - 0.6 * weather.saturation_pressure_water(celsius))
+    assert 1000.0 * gross == approx(preles_gpp(photons, 0.8 * 0.9, max(deficit, 0.0), celsius), rel=1e-12)
+
+
+def test_light_use_of_a_day():
+    assert [photosynthesis.readiness(v, -3.0, 18.0) for v in (-20.0, -3.0, 6.0, 15.0, 20.0)] == [0, 0, 0.5, 1, 1]
+    assert photosynthesis.light_saturation(0.0, 0.04) == 1.0
+    assert photosynthesis.light_saturation(25.0, 0.04) == approx(0.5)
+    assert photosynthesis.dry_air(10.0, 0.1) == approx(math.exp(-0.1))
+    assert photosynthesis.co2_response(380.0, 0.5) == 1.0
+    assert photosynthesis.co2_response(760.0, 0.5) == approx(1.0 + 0.5 * math.log(2.0))
+    state = 0.0
+    for _ in range(1000):
+        state = photosynthesis.acclimated(state, 12.0, 10.93)
+    assert state == approx(12.0)
+    assert photosynthesis.acclimated(0.0, 10.93, 10.93) == approx(1.0)
+
+
+def test_the_understorey_is_buried_by_snow():
+    assert [understorey.above_snow(depth, 0.25) for depth in (0.0, 0.125, 0.25, 1.0)] == [1.0, 0.5, 0.0, 0.0]
+    assert understorey.absorbed_share(0.0, 0.6, 1.2) == 0.0
+    assert understorey.absorbed_share(1.0, 0.6, 1.2) == approx(1.0 - math.exp(-0.72))
+
+
+def test_leaves_hide_the_wood():
+    assert structure.leaf_share(2.4, 1.0, 1.0) == 1.0
+    assert structure.leaf_share(2.4, 0.0, 1.0) == 0.0
+    assert structure.leaf_share(0.0, 0.9, 1.0) == 0.0
+    assert structure.leaf_share(1e-6, 0.8, 1.0) == approx(0.8, rel=1e-5)  # thin crowns: as their areas are
+    assert 0.95 < structure.leaf_share(3.0, 0.8, 1.0) < 1.0
 
 
 def test_q10():

@@ -16,6 +16,7 @@ from reference_step import (
     FUSION,
     SPECIES,
     WATER_DENSITY,
+    acclimated,
     generated_weather,
     hour_angle,
     observed_weather,
@@ -120,6 +121,7 @@ def draw_state(generator, p, day):
         "canopy_snow": generator.choice([0.0, generator.uniform(0.0, 0.5), generator.uniform(0.0, 20.0)]),
         "soil_water": generator.choice([0.0, capacity, generator.uniform(0.0, capacity)], p=[0.1, 0.1, 0.8]),
         "drought": generator.uniform(0.0, 60.0),
+        "acclimation": generator.normal(season, 5.0),
     }
     there = generator.choice([(1, 1), (1, 0), (0, 1), (0, 0)], p=[0.55, 0.15, 0.15, 0.15])
     for species, present in zip(SPECIES, there, strict=True):
@@ -234,7 +236,8 @@ def features_of(p, before, after, fluxes, steps_per_day):
         "rain in the canopy": after["canopy_rain"] > 0.0,
         "rain in the canopy dries up": before.canopy_rain > 0.0 and after["canopy_rain"] < 1e-9,
         "transpiration": fluxes["transpiration_mm"] > 0.0,
-        "photosynthesis": fluxes["gpp_kgc_m2"] > 0.0,
+        "photosynthesis": fluxes["gpp_kgc_m2"] > fluxes["understorey_gpp_kgc_m2"],
+        "photosynthesis of the understorey": fluxes["understorey_gpp_kgc_m2"] > 0.0,
         "respiration takes all": 0.0 < before.conifer_biomass and after["conifer_biomass"] < 1e-15,
         "night": fluxes["shortwave_mj_m2"] == 0.0,
         "dry soil": before.soil_water == 0.0,
@@ -302,8 +305,8 @@ def take_steps(p, s, day, draws, yesterday, observed, first, steps_per_day):
     b = fill_block(p, s, draws, yesterday)
     with np.errstate(all="ignore"):
         begin_year(b)
-        begin_day(b, day, forcing)
-        today = prepare_day(p, state_of(b), day, weather)
+        begin_day(b, day, hour_angles(steps_per_day), forcing)
+        today = prepare_day(p, state_of(b), day, weather, steps_per_day)
         for step in range(first, first + STEPS):
             before = state_of(b)
             fluxes = kernel_step(b, step, steps_per_day, forcing)
@@ -333,13 +336,15 @@ def test_generated_weather_of_every_day(limits):
         b = fill_block(p, draw_state(generator, p, 0), draws, 0.0)
         begin_year(b)
         yesterday = math.nan  # the first day has none
+        acclimation = b.s.acclimation[0]
         for day in range(DAYS):
-            begin_day(b, day, np.zeros((0, len(FORCING), 1)))
+            begin_day(b, day, hour_angles(4), np.zeros((0, len(FORCING), 1)))
             dice = (draws[name][day] for name in DAILY_WEATHER_DRAWS)
             expected = generated_weather(p, day, yesterday, *dice)
             yesterday = expected.anomaly
-            for name in ("mean", "minimum"):
-                assert getattr(b.w, f"{name}_temperature")[0] == approx(getattr(expected, name), abs=1e-10)
+            acclimation = acclimated(p, acclimation, expected)
+            assert b.w.mean_temperature[0] == approx(expected.mean, abs=1e-10)
+            assert b.s.acclimation[0] == approx(acclimation, abs=1e-10)
             for name in ("precipitation", "vapour", "emissivity", "diffuse", "wind"):
                 assert getattr(b.w, name)[0] == approx(getattr(expected, name), rel=1e-10)
 

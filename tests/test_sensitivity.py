@@ -22,8 +22,8 @@ def test_levels_keep_limits_and_order(share):
 @pytest.mark.parametrize(
     "name, steps",
     [
-        ("light_use_conifer", (0.1211, 0.1211)),
-        ("tmin_low_conifer", (2, 2)),
+        ("light_use_conifer", (0.07457, 0.07457)),
+        ("acclimation_start_conifer_c", (2, 2)),
         ("warmest_day", (9.1, 9.1)),
         ("humidity_wet_spring", (0.02, 0.02)),
         ("ground_emissivity", (0.08, 0.02)),

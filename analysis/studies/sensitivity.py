@@ -39,9 +39,38 @@ SPANS = {
 
 #: Published values other than the table's, several constants at once: label -> constants, mechanisms.
 ALTERNATIVES = {
-    "light use .96 conifer, 1.17 deciduous": ({"light_use_conifer": 0.96, "light_use_deciduous": 1.17}, {}),
-    "light use .98 conifer, 1.68 deciduous": ({"light_use_conifer": 0.98, "light_use_deciduous": 1.68}, {}),
-    "light use 1.21 conifer, 1.68 deciduous": ({"light_use_conifer": 1.21, "light_use_deciduous": 1.68}, {}),
+    "light use of conifers: PRELES of Hyytiala": (
+        {
+            "light_use_conifer": 0.7485,
+            "light_saturation_conifer": 0.03394,
+            "acclimation_days": 12.75,
+            "acclimation_start_conifer_c": -3.567,
+            "acclimation_span_conifer_k": 18.45,
+            "dry_air_conifer": 0.1367,
+        },
+        {},
+    ),
+    "light use of conifers: PRELES of 17 boreal forests": (
+        {
+            "light_use_conifer": 0.743,
+            "light_saturation_conifer": 0.04258,
+            "acclimation_days": 7.51,
+            "acclimation_start_conifer_c": -3.804,
+            "acclimation_span_conifer_k": 17.85,
+            "dry_air_conifer": 0.1426,
+        },
+        {},
+    ),
+    "light use of deciduous trees that of conifers": (
+        {
+            "light_use_deciduous": 0.7457,
+            "light_saturation_deciduous": 0.03673,
+            "acclimation_start_deciduous_c": -3.063,
+            "acclimation_span_deciduous_k": 17.72,
+            "dry_air_deciduous": 0.1027,
+        },
+        {},
+    ),
     "crowns of both species develop alike": ({}, {"crown_development": False}),
     "organic layer thin: .15 conifer, .05 deciduous": (
         {"organic_depth_conifer_m": 0.15, "organic_depth_deciduous_m": 0.05},

@@ -86,10 +86,8 @@ QUANTITIES = {
         "crowns close early",
     ),
     "basal area": Quantity("m2 ha-1", lambda run: run.annual["basal_area_m2_ha"], 0, "biomass", "biomass"),
-    "GPP": Quantity(
-        FLUX, lambda run: run.annual["gpp_kgc_m2"], 2, "leaf area; light use; no understorey", "light use", True
-    ),
-    "NPP": Quantity(FLUX, net_primary_production, 2, "leaf area; no understorey, no moss", "respiration", True),
+    "GPP": Quantity(FLUX, lambda run: run.annual["gpp_kgc_m2"], 2, "leaf area; light use", "light use", True),
+    "NPP": Quantity(FLUX, net_primary_production, 2, "leaf area; respiration", "respiration", True),
     "NEP": Quantity(FLUX, net_production, 2, "soil carbon drawn is beyond the litter's", "few dead trees", True),
     "deaths": Quantity("% yr-1", deaths, 1, "no old trees", THINNED, True),
 }
@@ -149,7 +147,7 @@ Even-aged stands by age against stands of that age (within {percent(stand_develo
 [stand_development.csv](../analysis/observations/stand_development.csv) with their sources, and towers of known age in
 ABCflux. The band is the range of the observations, {percent(stand_development.SLACK)} wider at both ends (NEP:
 {stand_development.SLACK_NEP:g} kgC/m2/yr). The observed stands are in warmer climates, 2 to −3 degC against −10 to −5
-here; their NPP, GPP and NEP include an understorey and moss, which the simulator lacks.
+here; their NPP, GPP and NEP include an understorey and moss.
 
 {document.table(["species", "quantity", "age", "model", "observed", "verdict", "from"], ages, left=7)}
 

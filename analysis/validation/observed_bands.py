@@ -182,7 +182,7 @@ CHECKS = {
         "1.5 by day over spruce (Betts et al. 1999)",
         "transpiration",
         "dry soil (the paper's few rain days) and cold nights stress transpiration, in colder summers equilibrium "
-        "evaporation is smaller; little heat into the ground; no understorey, no wet moss",
+        "evaporation is smaller; little heat into the ground; no wet moss",
     ),
     "interception loss of snowfall": Check(
         "1",

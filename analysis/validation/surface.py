@@ -32,7 +32,7 @@ def record_year(b, steps_per_day, no_weather, no_daily, surface):
     seconds = SECONDS_PER_DAY / steps_per_day
     hours = hour_angles(steps_per_day)
     for day in range(DAYS):
-        begin_day(b, day, no_weather)
+        begin_day(b, day, hours, no_weather)
         clear_day(b, day, no_daily)
         for t in range(steps_per_day):
             step_weather(b, t, hours, seconds, no_weather)

@@ -26,11 +26,11 @@ SNOW_DENSITY = (170.0, 217.0)  # kg m-3: Ikawa et al. 2024 at US-Prr in March 20
 
 LIKELY = {
     "SE-Svb": {
-        "GPP": "derived from net exchange with a respiration that doubles within days of August; no acclimation: "
-        "spring and autumn follow the night's minimum, where needles lag weeks",
+        "GPP": "light use is that of ten Nordic forests; what the understorey adds to them is counted again; the record "
+        "derives it from net exchange with a respiration that doubles within days of August",
         "ecosystem respiration": "soil carbon is assumed; respiration of roots follows the air, not the warm soil",
         "net exchange": "respiration follows the temperature of air and soil alone, the record's changes within days",
-        "latent heat": "transpiration follows net radiation and the night's minimum; canopy evaporation in autumn",
+        "latent heat": "transpiration follows net radiation; canopy evaporation in autumn",
         "sensible heat": "the tower's energy balance is open: H + LE is too small in the record",
         "ground heat": "November and December: the soil froze in the model and loses little afterwards; the record "
         "itself loses heat over the year",
@@ -38,9 +38,9 @@ LIKELY = {
         "albedo": "snow in the crowns changes no albedo; sky light and low sun",
     },
     "US-Prr": {
-        "GPP": "no understorey and no moss: more than half of this stand's leaf area (see the variant)",
-        "ecosystem respiration": "no understorey (its respiration follows GPP); one soil pool",
-        "net exchange": "GPP and respiration both lack the understorey's share",
+        "GPP": "light use of Nordic forests, on cold and poor ground; deciduous shrubs have no phenology",
+        "ecosystem respiration": "one soil pool; the understorey respires as it photosynthesises, not in winter",
+        "net exchange": "shrubs and moss have no phenology; soil carbon is assumed",
         "latent heat": "the ground evaporates too much in the weeks after melt (April to June): as wet ground at the "
         "warm skin's rate, where moss lies over ice that takes up the heat; the tower's open balance",
         "sensible heat": "too little heat goes into the ground in summer, so more goes to the air",
@@ -232,7 +232,7 @@ By month:
 
 {_spring_text(comparison, poker_flat_days(repeats, measured_spring=True))}
 
-{_understorey_text(comparison, poker_flat_days(repeats, tower_stands.US_PRR_UNDERSTOREY))}
+{_understorey_text(poker_flat_days(repeats, tower_stands.US_PRR_TREES_ALONE), comparison)}
 
 ![US-Prr](images/validation_US-Prr.png)"""
     likely = "too little snow (sublimation), which ages and melts too early; no refreezing of meltwater"
@@ -307,14 +307,14 @@ def _mostly_measured(fluxes: pd.DataFrame, name: str) -> pd.Series:
 
 def _understorey_text(trees: Comparison, both: Comparison) -> str:
     rows = []
-    for name in ("GPP", "ecosystem respiration", "latent heat"):
+    for name in ("GPP", "ecosystem respiration", "net exchange"):
         q, digits = QUANTITIES[name], QUANTITIES[name].digits
         courses = [tower_comparison.climatology(comparison.pairs[name]) for comparison in (trees, both)]
         summer = [course.loc[list(SUMMER)].mean() for course in courses]
         values = (summer[0]["measured"], summer[0]["modelled"], summer[1]["modelled"])
         rows.append([f"{name} [{q.unit}]", *(number(value, digits) for value in values)])
-    return f"""The simulator knows no understorey. Here it has more leaf area (0.78) than the trees (0.48). As a second,
-deciduous canopy (`tower_stands.US_PRR_UNDERSTOREY`), June to August:
+    return f"""The understorey has more leaf area here (0.78, measured) than the trees (0.48). What it adds to the
+fluxes of June to August (trees alone: `tower_stands.US_PRR_TREES_ALONE`):
 
 {document.table(["", "measured", "trees alone", "with understorey"], rows)}"""
 

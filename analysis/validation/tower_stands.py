@@ -48,8 +48,6 @@ SE_SVB = TowerStand(
 #: Leaf area of the trees per ground: leaf area and height of the 16 felled trees (log-log regression, corrected for
 #: its bias) over the 350 spruces of the 0.09 ha census of 2010; crowns of 0.44 m radius (20 trees) cover 0.21.
 _SPRUCE_LAI, _SPRUCE_COVER = 0.475, 0.208
-#: Mean of 16 quadrats: cloudberry, Labrador tea, lingonberry, cottongrass, bog birch.
-_UNDERSTOREY_LAI = 0.784
 
 US_PRR = TowerStand(
     site={
@@ -67,6 +65,8 @@ US_PRR = TowerStand(
         # Moss 0.14 m above the sensors' zero (Ikawa et al. 2024) and organic soil to 0.35 m below the surface
         # (Launiainen's set-up of pyAPES for US-Prr); kept there.
         **dict.fromkeys(("organic_depth_conifer_m", "organic_depth_deciduous_m", "organic_depth_open_m"), 0.30),
+        # Mean of 16 quadrats: cloudberry, Labrador tea, lingonberry, cottongrass, bog birch.
+        "understorey_lai": 0.784,
     },
     initial={
         "conifer_mature_stems_ha": 3889.0,  # 350 spruces on 0.09 ha, 2.4 m tall
@@ -77,10 +77,7 @@ US_PRR = TowerStand(
     },
 )
 
-#: The same with the understorey as a second, deciduous canopy over most of the ground. In winter it should lie under
-#: the snow, which the simulator cannot do: for summer only.
-US_PRR_UNDERSTOREY = TowerStand(
-    site={**US_PRR.site, "max_lai_deciduous": _UNDERSTOREY_LAI / 0.71, "woody_area_index": 0.05},
-    constants={**US_PRR.constants, "crown_area_deciduous_m2": 1.5, "leafless_share": 0.0},
-    initial={**US_PRR.initial, "deciduous_mature_stems_ha": 10000.0},
+#: The same without the understorey.
+US_PRR_TREES_ALONE = TowerStand(
+    site=US_PRR.site, constants={**US_PRR.constants, "understorey_lai": 0.0}, initial=US_PRR.initial
 )
