@@ -26,7 +26,7 @@ SNOW_DENSITY = (170.0, 217.0)  # kg m-3: Ikawa et al. 2024 at US-Prr in March 20
 
 LIKELY = {
     "SE-Svb": {
-        "GPP": "light use is that of ten Nordic forests; what the understorey adds to them is counted again; the record "
+        "GPP": "light use is that of ten Nordic forests; what the understorey adds is counted again; the record "
         "derives it from net exchange with a respiration that doubles within days of August",
         "ecosystem respiration": "soil carbon is assumed; respiration of roots follows the air, not the warm soil",
         "net exchange": "respiration follows the temperature of air and soil alone, the record's changes within days",
