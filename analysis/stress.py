@@ -34,7 +34,7 @@ from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.physical_constants import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.spin_up import CLASS_NAMES, INITIAL_LIMITS
 from sim.stands import available_cores
-from sim.state import DAILY_NAMES, DAYS, PARAMETER_NAMES, STATE_NAMES
+from sim.state import CARBON_BUDGETS, DAILY_NAMES, DAYS, PARAMETER_NAMES, STATE_NAMES
 from sim.trunk import LEAST_TRUNK_CAPACITY
 
 
@@ -70,10 +70,20 @@ STEP_MINUTES = {10: 0.05, 15: 0.05, 20: 0.10, 30: 0.40, 60: 0.20, 120: 0.20}  # 
 HALF_LIVES = (None, 0.1, 20.0, 1e4)  # of wood products [yr]
 CLASSES_TO_CUT = ("young", "mature", "old")
 
+#: Stocks of `CARBON_BUDGETS`, as the state has them.
+CARBON_STORES = {
+    "biomass_kgc_m2": ("conifer_biomass", "deciduous_biomass"),
+    "soil_kgc_m2": ("soil_carbon",),
+    "hwp_kgc_m2": ("products",),
+}
+
 #: What is added up again from states and records, without the kernel's help: name -> tolerance, per (1 + the stock or
 #: the year's flux that the sum contains).
 YEARLY_BUDGETS = {
     "carbon_of_the_year_kgc_m2": 1e-9,
+    "biomass_of_the_year_kgc_m2": 1e-9,
+    "soil_of_the_year_kgc_m2": 1e-9,
+    "hwp_of_the_year_kgc_m2": 1e-9,
     "water_of_the_year_mm": 1e-9,
     "deep_heat_of_the_year_mj_m2": 1e-9,
     "latent_heat_of_the_year_mj_m2": 1e-9,
@@ -219,6 +229,10 @@ def budgets(before: np.ndarray, after: np.ndarray, record: dict) -> Iterator[tup
         - r["hwp_decay_kgc_m2"]
     )
     yield "carbon_of_the_year_kgc_m2", np.abs(carbon - crossed) / (1.0 + stock)
+    for name, stores in CARBON_STORES.items():
+        carbon, stock = change(*stores)
+        gains, losses = (sum(r[flux] for flux in fluxes) for fluxes in CARBON_BUDGETS[name])
+        yield f"{name.removesuffix('_kgc_m2')}_of_the_year_kgc_m2", np.abs(carbon - gains + losses) / (1.0 + stock)
 
     water, stock = change("swe", "canopy_snow", "canopy_rain", "organic_water", "soil_water")
     crossed = r["precipitation_mm"] - r["evapotranspiration_mm"] - r["runoff_mm"]
@@ -277,6 +291,8 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         "mortality_kgc_m2",
         "fire_mortality_kgc_m2",
         "fire_loss_kgc_m2",
+        "burned_trees_kgc_m2",
+        "burned_soil_kgc_m2",
         "harvest_kgc_m2",
         "harvest_emission_kgc_m2",
         "hwp_stored_kgc_m2",
@@ -287,6 +303,8 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         "boundary_cooling_mj_m2",
         "planted_stems_ha",
         "thinned_stems_ha",
+        "dead_stems_ha",
+        "recruited_stems_ha",
         "drought_index",
         "peak_swe_mm",
         "peak_snow_depth_m",
