@@ -63,28 +63,36 @@ def carbon_dioxide(b, i):
 
 
 @compiled
-def generated_day(b, i, hours):
-    """Mean shortwave [W m-2] and vapour pressure deficit [hPa] of a generated day."""
-    w = b.w
-    sun = 0.0
+def generated_day(b, hours):
+    """Photons above the canopy [mol m-2 day-1] and mean vapour pressure deficit [hPa] of a generated day."""
+    p, w = b.p, b.w
+    lanes = len(b.s.swe)
+    for i in range(lanes):
+        w.photons[i] = 0.0
     for t in range(len(hours)):
-        sun += cos_zenith(w.sun_a[i], w.sun_b[i], hours[t, 0])
-    swing = HALF_WAY * w.amplitude[i]
-    warm = saturation_pressure(w.mean_temperature[i] + swing) - w.vapour[i]
-    cold = saturation_pressure(w.mean_temperature[i] - swing) - w.vapour[i]
-    return w.top_of_canopy[i] * sun / len(hours), 0.5 * (max(warm, 0.0) + max(cold, 0.0))
+        for i in range(lanes):
+            w.photons[i] += cos_zenith(w.sun_a[i], w.sun_b[i], hours[t, 0])
+    for i in range(lanes):
+        w.photons[i] *= p.par_fraction[i] * (PHOTONS_PER_MEGAJOULE * MJ_PER_DAY / len(hours)) * w.top_of_canopy[i]
+        swing = HALF_WAY * w.amplitude[i]
+        warm = saturation_pressure(w.mean_temperature[i] + swing) - w.vapour[i]
+        cold = saturation_pressure(w.mean_temperature[i] - swing) - w.vapour[i]
+        w.mean_deficit[i] = 0.5 * (max(warm, 0.0) + max(cold, 0.0))
 
 
 @compiled
-def observed_day(b, i, observed):
+def observed_day(b, observed):
     """The same of an observed day."""
+    p, w = b.p, b.w
     steps = observed.shape[0]
-    sun, deficit = 0.0, 0.0
-    for t in range(steps):
-        air = observed[t, 0, i]
-        sun += observed[t, 3, i]
-        deficit += max(saturation_pressure(air) - observed[t, 1, i] * saturation_pressure_water(air), 0.0)
-    return sun / steps, deficit / steps
+    for i in range(len(b.s.swe)):
+        sun, deficit = 0.0, 0.0
+        for t in range(steps):
+            air = observed[t, 0, i]
+            sun += observed[t, 3, i]
+            deficit += max(saturation_pressure(air) - observed[t, 1, i] * saturation_pressure_water(air), 0.0)
+        w.photons[i] = p.par_fraction[i] * (PHOTONS_PER_MEGAJOULE * MJ_PER_DAY / steps) * sun
+        w.mean_deficit[i] = deficit / steps
 
 
 @phase
@@ -94,12 +102,11 @@ def light_use(b, hours, observed):
     hours, observed : as of `sim.forcing.step_weather`.
     """
     s, p, w = b.s, b.p, b.w
+    if observed.shape[0] > 0:
+        observed_day(b, observed)
+    else:
+        generated_day(b, hours)
     for i in range(len(s.swe)):
-        if observed.shape[0] > 0:
-            shortwave, deficit = observed_day(b, i, observed)
-        else:
-            shortwave, deficit = generated_day(b, i, hours)
-        photons = p.par_fraction[i] * PHOTONS_PER_MEGAJOULE * MJ_PER_DAY * shortwave
         s.acclimation[i] = acclimated(s.acclimation[i], w.mean_temperature[i], p.acclimation_days[i])
         w.ready_conifer[i] = readiness(
             s.acclimation[i], p.acclimation_start_conifer_c[i], p.acclimation_span_conifer_k[i]
@@ -107,12 +114,12 @@ def light_use(b, hours, observed):
         w.ready_deciduous[i] = readiness(
             s.acclimation[i], p.acclimation_start_deciduous_c[i], p.acclimation_span_deciduous_k[i]
         )
-        w.dry_air_conifer[i] = dry_air(deficit, p.dry_air_conifer[i])
-        w.dry_air_deciduous[i] = dry_air(deficit, p.dry_air_deciduous[i])
+        w.dry_air_conifer[i] = dry_air(w.mean_deficit[i], p.dry_air_conifer[i])
+        w.dry_air_deciduous[i] = dry_air(w.mean_deficit[i], p.dry_air_deciduous[i])
         # mol MJ-1 x gC mol-1, and kgC J-1 from gC MJ-1
         light = 1e-9 * PHOTONS_PER_MEGAJOULE * p.par_fraction[i] * w.co2_growth[i]
-        conifer = light * w.ready_conifer[i] * light_saturation(photons, p.light_saturation_conifer[i])
-        deciduous = light * w.ready_deciduous[i] * light_saturation(photons, p.light_saturation_deciduous[i])
+        conifer = light * w.ready_conifer[i] * light_saturation(w.photons[i], p.light_saturation_conifer[i])
+        deciduous = light * w.ready_deciduous[i] * light_saturation(w.photons[i], p.light_saturation_deciduous[i])
         w.efficiency_conifer[i] = conifer * w.light_use_conifer[i] * w.leaf_conifer[i]
         w.efficiency_deciduous[i] = deciduous * w.light_use_deciduous[i] * w.leaf_deciduous[i]
         w.efficiency_understorey[i] = conifer * p.light_use_understorey[i]

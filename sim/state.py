@@ -227,7 +227,7 @@ water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_
 floor_water layer_share organic organic_base organic_by_ground organic_conductance organic_sum surface_by_organic
 thaw_water wind
 co2_growth co2_stomata dry_air_conifer dry_air_deciduous efficiency_conifer efficiency_deciduous efficiency_understorey
-gpp_understorey photons ready_conifer ready_deciduous
+gpp_understorey mean_deficit photons ready_conifer ready_deciduous
 """.split()
 
 

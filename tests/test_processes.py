@@ -701,7 +701,7 @@ def test_a_day_of_photosynthesis_is_that_of_preles(celsius):
     work = {"mean_temperature": [celsius], "water_stress": [1.0], "leaf_conifer": [0.9], "leaf_deciduous": [0.9]}
     work |= {f"light_use_{species}": constants[f"light_use_{species}"] for species in ("conifer", "deciduous")}
     answers = "co2_growth co2_stomata ready_conifer ready_deciduous dry_air_conifer dry_air_deciduous gpp_conifer"
-    answers += " efficiency_conifer efficiency_deciduous efficiency_understorey gpp_deciduous"
+    answers += " efficiency_conifer efficiency_deciduous efficiency_understorey gpp_deciduous photons mean_deficit"
     work |= {name: [0.0] for name in answers.split()}
     b = SimpleNamespace(p=SimpleNamespace(**constants), s=state, w=SimpleNamespace(**work))
     photosynthesis.carbon_dioxide(b, 0)
