@@ -132,7 +132,8 @@ class Stands:
         last_year = self._spin_up(stands, observed if whole_year else None)
         if self.soil_carbon == "balanced":
             drawn = [k for k in range(len(stands)) if "soil_kgc_m2" not in ((initial or {}).get(k) or {})]
-            self._balance_soil_carbon(stands[drawn], last_year[drawn])
+            if drawn:
+                self._balance_soil_carbon(stands[drawn], last_year[drawn])
 
     def _balance_soil_carbon(self, stands, record) -> None:
         """First soil carbon that the litter keeps up; as drawn where there are no trees. record : of a year."""

@@ -14,6 +14,7 @@ import sim
 from sim import block
 from sim.block import kernel
 from sim.state import DAILY_NAMES
+from sim.task.episodes import BALANCED_WORLD
 
 NUMBER = 19
 MINUTES = 120
@@ -74,6 +75,19 @@ def test_a_year_is_the_same_interpreted_and_compiled(seed, action):
     assert difference(record[:, keep], expected[:, keep]) <= 1e-9
     assert difference(days, expected_days) <= 1e-9
     assert difference(interpreted.state, compiled.state) <= 1e-9
+
+
+def test_a_world_in_balance_is_the_same_alone_in_lockstep_and_interpreted():
+    everyone, alone = start(5, **BALANCED_WORLD), sim.Stands(1, time_step_minutes=MINUTES, **BALANCED_WORLD)
+    begin(alone, [3])
+    np.testing.assert_array_equal(alone.parameters[0], everyone.parameters[3])
+    np.testing.assert_array_equal(alone.state[0], everyone.state[3])
+    interpreted = sim.Stands(1, time_step_minutes=MINUTES, backend="python")
+    interpreted.set_state(alone.get_state())
+    expected = alone.step(np.array([24]))
+    np.testing.assert_array_equal(everyone.step(np.full(5, 24))[3], expected[0])
+    kept = [i for i, name in enumerate(sim.RECORD_NAMES) if "residual" not in name]
+    assert difference(interpreted.step(np.array([24]))[:, kept], expected[:, kept]) <= 1e-9
 
 
 def test_observed_weather_is_the_same_interpreted_and_compiled():

@@ -16,11 +16,13 @@ from sim.demography import AGES
 from sim.physical_constants import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.spin_up import INITIAL_LIMITS
 from sim.state import CARBON_BUDGETS, DAILY_NAMES, STATE_NAMES
+from sim.task.episodes import BALANCED_WORLD
 
 # Name -> (limits of the parameters, corners or even draws, time step in minutes, stands).
 CASES = {
     "sampled-10min": ("sampled", "even", 10, 16),
     "sampled-30min": ("sampled", "even", 30, 48),
+    "balanced-30min": ("sampled", "even", 30, 48),
     "sampled-corners-30min": ("sampled", "corners", 30, 48),
     "sampled-corners-120min": ("sampled", "corners", 120, 64),
     "physical-60min": ("physical", "even", 60, 64),
@@ -57,7 +59,9 @@ def run(request):
     initial = {
         k: {name: float(generator.choice(pair)) for name, pair in INITIAL_LIMITS.items()} for k in range(0, number, 3)
     }
-    stands = sim.Stands(number, time_step_minutes=minutes, hwp_half_life_years=20 if how == "corners" else None)
+    world = BALANCED_WORLD if request.param.startswith("balanced") else {}
+    half_life = 20 if how == "corners" else None
+    stands = sim.Stands(number, time_step_minutes=minutes, hwp_half_life_years=half_life, **world)
     stands.start(np.arange(number), sites, [sim.episode_seeds(k) for k in range(number)], initial)
     years = []
     for _ in range(YEARS):

@@ -63,6 +63,14 @@ BAD_ARGUMENTS = {
     "group twice": ({"observation_groups": ("age", "state", "age")}, r"observation_groups age, state, age: each"),
     "boundary": ({"boundary": "fixed"}, r"boundary 'fixed': allowed are sampled, balanced"),
     "soil carbon": ({"soil_carbon": 1.0}, r"soil_carbon 1.0: allowed are drawn, balanced"),
+    "boundary twice": (
+        {"boundary": "balanced", "parameter_overrides": {"deep_boundary_temperature_k": 270.0}},
+        r"deep_boundary_temperature_k: boundary='balanced' finds it",
+    ),
+    "soil carbon twice": (
+        {"soil_carbon": "balanced", "initial_ranges": {"soil_kgc_m2": (2.0, 3.0)}},
+        r"soil_kgc_m2: soil_carbon='balanced' finds it",
+    ),
     "weather": ({"weather": None}, r"weather None: allowed are paper, observed"),
     "balanced of number": ({"balanced": 1.4}, r"balanced: True or False is allowed, got 1.4"),
     "record of number": ({"record_years": 1}, r"record_years: True or False is allowed, got 1"),

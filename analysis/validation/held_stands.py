@@ -56,13 +56,14 @@ def hold(
     mechanisms: dict | None = None,
     site_overrides: dict | None = None,
     keep_daily: tuple[str, ...] = (),
+    **world,
 ) -> Run:
     """Run a kind of stand on sampled sites 0 to `sites` - 1 for `skipped` + `years` years, the last of which are kept.
 
     kind : first stocks, one of `KINDS` or like them; site_overrides : of `sim.sample_site`; keep_daily : daily columns
-    to keep day by day.
+    to keep day by day; world : other arguments of `sim.Stands`, such as weather and boundary.
     """
-    stands = sim.Stands(sites, mechanisms=mechanisms)
+    stands = sim.Stands(sites, mechanisms=mechanisms, **world)
     numbers = np.arange(sites)
     parameters = [sim.sample_site(k, site_overrides) for k in range(sites)]
     seeds = [sim.episode_seeds(k) for k in range(sites)]

@@ -9,7 +9,7 @@ from gymnasium.spaces import Box
 import sim
 from sim.management import check_actions
 from sim.parameters import check_seed
-from sim.spin_up import check_initial_ranges, middle_stocks
+from sim.spin_up import BOUNDARY, check_initial_ranges, middle_stocks
 from sim.task.actions import MaskFunction, mask_function, unchanged
 from sim.task.checks import check_choice
 from sim.task.objectives import (
@@ -76,6 +76,12 @@ class Episodes:
         sim.middle_site(parameter_overrides)
         self.site_seed, self.parameter_overrides = site_seed, dict(parameter_overrides or {})
         self.initial_ranges = check_initial_ranges(initial_ranges)
+        for name, how, ours, given in (
+            (BOUNDARY, "boundary", boundary, self.parameter_overrides),
+            ("soil_kgc_m2", "soil_carbon", soil_carbon, self.initial_ranges),
+        ):
+            if ours == "balanced" and name in given:
+                raise ValueError(f"{name}: {how}='balanced' finds it; a value of your own is not allowed")
         self.harvest_min_class = harvest_min_class
         self.reward = Reward.of(reward, bool(balanced))
         objectives = check_objectives(objectives)
