@@ -148,6 +148,7 @@ CARBON_BUDGETS = {
         ("gpp_kgc_m2",),
         (
             "autotrophic_respiration_kgc_m2",
+            "understorey_litter_kgc_m2",
             "litterfall_kgc_m2",
             "mortality_kgc_m2",
             "fire_mortality_kgc_m2",
@@ -156,7 +157,7 @@ CARBON_BUDGETS = {
         ),
     ),
     "soil_kgc_m2": (
-        ("litterfall_kgc_m2", "mortality_kgc_m2", "fire_mortality_kgc_m2"),
+        ("litterfall_kgc_m2", "understorey_litter_kgc_m2", "mortality_kgc_m2", "fire_mortality_kgc_m2"),
         ("heterotrophic_respiration_kgc_m2", "burned_soil_kgc_m2"),
     ),
     "hwp_kgc_m2": (("hwp_stored_kgc_m2",), ("hwp_decay_kgc_m2",)),
