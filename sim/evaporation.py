@@ -13,6 +13,8 @@ from sim.physical_constants import (
 from sim.water import left_by_leaves
 from sim.weather import SATURATION_AT_FREEZING_HPA, saturation_pressure, saturation_slope
 
+FLOOR_WARMING_K = 30.0  # within a step, that the floor's water lasts
+
 
 @phase
 def transpiring_leaves(b):
@@ -46,7 +48,7 @@ def moss_conductance(exchange, wetness, resistance) -> float:
     """Conductance for vapour [m s-1] between moss and air: the air's exchange, and in series with it the moss's, whose
     resistance climbs sharply with drying (Bond-Lamberty et al. 2010). resistance : of wet moss [s m-1]."""
     open_share = wetness * wetness
-    return exchange * open_share / (open_share + exchange * resistance) if wetness > 0.0 else 0.0
+    return exchange * open_share / (open_share + exchange * resistance) if open_share > 0.0 else 0.0
 
 
 @compiled
@@ -67,14 +69,16 @@ def ground_vapour(b, seconds):
         soil = left_by_leaves(s.soil_water[i], p.max_water_content_mm[i], p.water_stress_threshold[i], seconds)
         w.floor_water[i] = layer + soil
         w.layer_share[i] = layer / (layer + soil) if layer > 0.0 else 0.0
-        # No more vapour is exchanged within the step than there is water, by snow at 0 degC: the limit is on the
-        # conductance, so that the ground's equation and what is moved agree.
+        # No more vapour is exchanged within the step than there is water, by snow at 0 degC or by a floor that warms:
+        # the limit is on the conductance, so that the ground's equation and what is moved agree.
         store = s.swe[i] if snow else w.floor_water[i]
-        drying = max(abs((SATURATION_AT_FREEZING_HPA if snow else saturated) - w.humidity[i]), 1e-3)
+        slope = saturation_slope(surface, saturated)
+        drying = abs((SATURATION_AT_FREEZING_HPA if snow else saturated) - w.humidity[i])
+        drying = max(drying + (0.0 if snow else FLOOR_WARMING_K * slope), 1e-3)
         transfer = min(w.vapour_density[i] * conductance, store / (seconds * drying))
         heat = LATENT_HEAT_SUBLIMATION if snow else LATENT_HEAT_VAPORISATION
         w.ground_latent[i] = heat * transfer * (saturated - w.humidity[i])
-        w.latent_slope[i] = heat * transfer * saturation_slope(surface, saturated)
+        w.latent_slope[i] = heat * transfer * slope
 
 
 @compiled

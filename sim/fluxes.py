@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from sim.account import add_step, total_sensible, total_vapour
 from sim.jit import compiled
-from sim.organic import wet_organic_layer
+from sim.organic import warm_organic_layer, wet_organic_layer
 from sim.photosynthesis import energy_of_photosynthesis
 from sim.physical_constants import (
     FREEZING_POINT_K,
@@ -142,11 +142,15 @@ def warm_ground(b, i, longwave, heat, vapour, seconds):
 @compiled
 def warm_soil_and_trunk(b, i, heat, seconds):
     """Canopy, trunk, organic layer and soil take what reaches them."""
-    s = b.s
-    s.canopy[i] = b.w.trial[i]
+    s, w = b.s, b.w
+    s.canopy[i] = w.trial[i]
     s.trunk[i] += seconds * (heat.canopy_to_trunk - heat.trunk_to_air - heat.trunk_to_ground) / s.trunk_capacity[i]
-    s.organic_heat[i] += seconds * (heat.ground_to_organic - heat.organic_to_surface)
-    s.surface_heat[i] += seconds * (heat.organic_to_surface - heat.surface_to_deep)
+    surface = w.surface_base[i] + w.surface_by_organic[i] * (
+        w.organic_base[i] + w.organic_by_ground[i] * w.ground_new[i]
+    )
+    gained = seconds * (heat.ground_to_organic - heat.organic_to_surface)
+    passed = warm_organic_layer(b, i, gained, surface, w.ground_new[i])
+    s.surface_heat[i] += seconds * (heat.organic_to_surface - heat.surface_to_deep) + passed
     s.deep_heat[i] += seconds * (heat.surface_to_deep - heat.deep_to_boundary)
 
 

@@ -12,7 +12,7 @@ from sim.physical_constants import (
     WATER_DENSITY,
     WATER_HEAT_CAPACITY,
 )
-from sim.soil import conductivity, frozen_share, temperature, where_it_freezes
+from sim.soil import conductivity, enthalpy, frozen_share, temperature, where_it_freezes
 
 LEAST_DEPTH_M = 0.01  # of litter, where neither moss nor humus is
 
@@ -121,9 +121,27 @@ def wetness(b, i) -> float:
 
 
 @compiled
-def drained(water, frozen, held, pores) -> float:
-    """Water that drains [mm]: what is liquid of all beyond what the layer holds, and all beyond its pores."""
-    return max(min(max(water - held, 0.0), water * (1.0 - frozen)), water - pores)
+def warm_organic_layer(b, i, gained, below, above) -> float:
+    """Let a lane's organic layer gain heat [J m-2]; returns what it passes on to the soil.
+
+    below, above : temperatures of soil and ground at the step's end [degC]. A layer that starts to freeze or has just
+    frozen gains or loses more in the step than its heat capacity of the start says. What would warm or cool it beyond
+    its neighbours and its own start, which no conduction can, passes through.
+    """
+    s, w = b.s, b.w
+    thawed, frozen, latent = organic_capacities(b, i)
+    span = b.p.soil_freezing_range_k[i]
+    low, high = min(w.organic[i], min(below, above)), max(w.organic[i], max(below, above))
+    heat = s.organic_heat[i] + gained
+    kept = min(max(heat, enthalpy(low, thawed, frozen, latent, span)), enthalpy(high, thawed, frozen, latent, span))
+    s.organic_heat[i] = kept
+    return heat - kept
+
+
+@compiled
+def drained(water, frozen, held) -> float:
+    """Water that drains [mm]: of all beyond what the layer holds, what is liquid."""
+    return min(max(water - held, 0.0), water * (1.0 - frozen))
 
 
 @compiled
@@ -140,7 +158,7 @@ def wet_organic_layer(b, i, rain, melted, evaporated):
     s.organic_heat[i] += brought
     now = organic_temperature(b, i)
     ice = p.soil_freezing[i] * frozen_share(now, p.soil_freezing_range_k[i])
-    away = drained(water, ice, water_held(b, i), WATER_DENSITY * p.organic_porosity[i] * organic_thickness(b, i))
+    away = drained(water, ice, water_held(b, i))
     taken = WATER_HEAT_CAPACITY * max(now, 0.0) * away
     s.organic_water[i] = water - away
     s.organic_heat[i] -= taken

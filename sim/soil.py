@@ -47,11 +47,8 @@ def temperature(enthalpy, thawed, frozen, latent, freezing_range) -> float:
 @compiled
 def enthalpy(node_temperature, thawed, frozen, latent, freezing_range) -> float:
     """Inverse of `temperature`."""
-    if node_temperature >= 0.0:
-        return thawed * node_temperature
-    if node_temperature > -freezing_range:
-        return (latent / freezing_range + frozen) * node_temperature
-    return -(latent + frozen * freezing_range) + frozen * (node_temperature + freezing_range)
+    sensible = (thawed if node_temperature >= 0.0 else frozen) * node_temperature
+    return sensible + latent * max(min(node_temperature, 0.0) / freezing_range, -1.0)
 
 
 @compiled

@@ -6,6 +6,8 @@ from sim.mathematics import exponential
 from sim.physical_constants import SQUARE_METRES_PER_HECTARE
 from sim.radiation import canopy_interception
 
+LEAST_AREA = 1e-300  # m2 m-2; leafless crowns without wood have leaves of no area, which is not to be divided by
+
 
 @compiled
 def crown_factor(age, seedling, sapling, young, mature, old) -> float:
@@ -98,7 +100,9 @@ def leaves(b, day):
         w.optical_conifer[i] = p.light_extinction[i] * area_conifer
         w.optical_deciduous[i] = p.light_extinction[i] * area_deciduous
         w.leaf_conifer[i] = leaf_share(w.optical_conifer[i], green_conifer / area_conifer, p.sky_path[i])
-        w.leaf_deciduous[i] = leaf_share(w.optical_deciduous[i], green_deciduous / area_deciduous, p.sky_path[i])
+        w.leaf_deciduous[i] = leaf_share(
+            w.optical_deciduous[i], green_deciduous / max(area_deciduous, LEAST_AREA), p.sky_path[i]
+        )
         w.lai_conifer[i] = green_conifer * w.cover_conifer[i]
         w.lai_deciduous[i] = green_deciduous * w.cover_deciduous[i]
         w.snow_area[i] = w.cover_conifer[i] * area_conifer + w.cover_deciduous[i] * area_deciduous

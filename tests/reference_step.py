@@ -491,11 +491,12 @@ def water_left_by_leaves(p, s, seconds):
 
 def floor_conductance(p, air, today, exchange, wetness, water, ground, seconds):
     """For vapour, of the thawed moss floor [mm s-1 hPa-1], at most such that its water lasts the step."""
-    if ground <= 0.0 or wetness <= 0.0:
+    if ground <= 0.0 or wetness**2 <= 0.0:
         return 0.0
     resistance = today.air_density * AIR_HEAT / exchange + p.moss_resistance / wetness**2
     conductance = today.air_density * VAPOUR_RATIO / p.air_pressure_hpa / resistance
-    return min(conductance, water / (seconds * max(abs(saturation_pressure(ground) - air.vapour), 1e-3)))
+    drying = abs(saturation_pressure(ground) - air.vapour) + 30.0 * saturation_slope(ground)
+    return min(conductance, water / (seconds * max(drying, 1e-3)))
 
 
 def snow_conductance(p, air, exchange, snow, seconds):
@@ -643,6 +644,14 @@ class SoilNode:
         if heat > all_frozen:
             return heat / self.freezing
         return -self.freezing_range + (heat - all_frozen) / self.frozen
+
+    def heat(self, celsius):
+        """Enthalpy [J m-2] at a temperature."""
+        if celsius >= 0.0:
+            return self.thawed * celsius
+        if celsius > -self.freezing_range:
+            return self.freezing * celsius
+        return -(self.latent + self.frozen * self.freezing_range) + self.frozen * (celsius + self.freezing_range)
 
     def heat_capacity(self, heat):
         """Slope of enthalpy over temperature."""
@@ -1053,13 +1062,15 @@ def take_step(p, s, today, step, steps_per_day):
     snow_left = snow - vapour - melted
     from_moss = evaporated * moss_water / (moss_water + soil_reach) if moss_water > 0.0 else 0.0
     organic_water = max(s.organic_water + to_soil + melted - from_moss, 0.0)
-    organic_heat = s.organic_heat + seconds * organic_gain
+    layer = organic_node(p, s, s.organic_water)
+    coldest, warmest = (layer.heat(pick(organic_start, surface, ground)) for pick in (min, max))
+    organic_heat = min(max(s.organic_heat + seconds * organic_gain, coldest), warmest)
+    passed = s.organic_heat + seconds * organic_gain - organic_heat
     organic_heat += WATER_HEAT * (to_soil * max(air.celsius, 0.0) - from_moss * max(organic_start, 0.0))
     organic_now = organic_node(p, s, organic_water).temperature(organic_heat)
     liquid = organic_water * (1.0 - frozen_share(p, organic_now) * p.soil_freezing)
     beyond = max(organic_water - sum(organic_water_held(p, s)), 0.0)
-    pores = WATER_DENSITY * p.organic_porosity * organic_thickness(p, s)
-    drained = max(min(beyond, liquid), organic_water - pores)
+    drained = min(beyond, liquid)
     water = s.soil_water + drained - transpired - (evaporated - from_moss)
     runoff = max(water - p.max_water_content_mm, 0.0)
     biomass = {species: getattr(s, f"{species}_biomass") for species in SPECIES}
@@ -1082,7 +1093,7 @@ def take_step(p, s, today, step, steps_per_day):
         "ground": (heat - FUSION * melted) / (p.skin_heat_capacity + ICE_HEAT * snow_left),
         "organic_heat": organic_heat - WATER_HEAT * drained * max(organic_now, 0.0),
         "organic_water": organic_water - drained,
-        "surface_heat": s.surface_heat + seconds * surface_gain,
+        "surface_heat": s.surface_heat + seconds * surface_gain + passed,
         "deep_heat": s.deep_heat + seconds * deep_gain,
         "swe": snow_left,
         "snow_density": snow_density(s, aloft.to_ground, fresh_snow_density(p, air, floor_wind(p, s, air, today))),

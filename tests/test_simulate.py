@@ -211,7 +211,7 @@ def test_every_mechanism_can_be_switched_off(mechanism):
 
 
 def test_no_heat_flows_through_a_boundary_in_balance():
-    site = {"mean_annual_temperature_c": -9.0, "deep_boundary_temperature_k": 272.0}
+    site = {"mean_annual_temperature_c": -10.0, "deep_boundary_temperature_k": 272.0}
     heat = {}
     for boundary in ("sampled", "balanced"):
         table = simulate(site, boundary=boundary, years=10, mechanisms={"fire": False})
