@@ -8,7 +8,7 @@ from analysis.studies import open_loop
 
 def test_play_gives_the_environments_returns_and_replaces_what_cannot_be_done():
     env = boreal_env.BorealEnv(years=3)
-    env.reset(seed=4)
+    env.reset(seed=5)
     plan = [24, 0, 14]
     carried_out = []
     for action in plan:

@@ -118,17 +118,18 @@ def test_energy_offset_by_hand():
 
 
 def test_temperature_within_the_organic_layer():
-    """10 W/m2 through 0.11 m of 0.2 (thawed) or 0.4 W/m/K (frozen)."""
+    """Straight lines from the surface to the layer's middle, and from there to the mineral soil."""
     days = pd.DataFrame(
         {
-            "soil_top_temperature_c": [2.0, -4.0],
-            "ground_heat_mj_m2": [0.864, -0.864],
-            "organic_layer_m": 0.30,
             "ground_temperature_c": [12.0, -15.0],
-            "surface_soil_temperature_c": [1.0, -3.0],
+            "organic_temperature_c": [6.0, -8.0],
+            "soil_top_temperature_c": [2.0, -4.0],
+            "organic_layer_m": 0.30,
         }
     )
-    np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.19), [2.0 + 5.5, -4.0 - 2.75])
+    np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.05), [10.0, -15.0 + 7.0 / 3.0])
+    np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.15), [6.0, -8.0])
+    np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.25), [6.0 - 8.0 / 3.0, -8.0 + 8.0 / 3.0])
 
 
 def test_large_rmse_misses_without_bias_and_unjudged_has_no_verdict():

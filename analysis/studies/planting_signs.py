@@ -102,7 +102,7 @@ def main(args: Args) -> None:
     everything = variants()
     if args.quick:
         args.sites, args.years = 2, 2
-        everything = [v for v in everything if v is DEFAULT or v.factor.startswith("snow_density")]
+        everything = [v for v in everything if v is DEFAULT or v.factor.startswith("snow_viscosity")]
     if args.names:
         unknown = [name for name in args.names if name not in sim.CONSTANTS]
         if unknown:

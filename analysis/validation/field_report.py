@@ -38,7 +38,7 @@ INTERIOR_ALASKA = {
 DEEP_MOSS_THAW = Band(0.36, 0.80)
 DEEP_MOSS_SOURCE = "Wickersham, 36 years, .36-.52 (Viereck et al. 2008, abstract); .8 is asked for"
 
-SUMMER = "the ground's summer: an organic layer without heat, water or ice of its own; exchange below the canopy"
+SUMMER = "the moss on top does not dry by itself; ice-poor mineral soil; exchange in and below the canopy"
 
 
 def report(sites: int) -> Part:

@@ -170,7 +170,7 @@ CHECKS = {
         surface_offset,
         _for(ALL, 2.0, 5.0),
         "US-Prr 3.1 (2011-14), SE-Svb 1.7 (2019); Zhang et al. 2018; snow alone 5.1 ± 3.2 (Peng et al. 2024)",
-        "organic layer without freezing water; dense, thin snow",
+        "dense, thin snow",
         "snow",
         digits=1,
     ),
@@ -182,7 +182,7 @@ CHECKS = {
         "1.5 by day over spruce (Betts et al. 1999)",
         "transpiration",
         "dry soil (the paper's few rain days) and cold nights stress transpiration, in colder summers equilibrium "
-        "evaporation is smaller; little heat into the ground; no wet moss",
+        "evaporation is smaller; little heat into the ground",
     ),
     "interception loss of snowfall": Check(
         "1",
@@ -199,6 +199,6 @@ WARMING = Check(
     lambda run: run.sites("surface_soil_temperature_c"),
     {FELLED: Band(0.5, 1.5)},
     "about 1 K",
-    "the organic layer insulates the same below trees and in the sun: it does not dry, nor does its ice melt",
+    "the moss of the open does not dry by itself",
     "the organic layer of open ground insulates less than that of conifers",
 )

@@ -1,4 +1,4 @@
-"""The part of the validation on what the thaw return hangs on: the boundary, the snow's density, every constant."""
+"""The part of the validation on what the thaw return hangs on: the boundary, and every constant."""
 
 import numpy as np
 import pandas as pd
@@ -14,22 +14,6 @@ from sim.task.episodes import BALANCED_WORLD
 
 YEARS, QUICK_YEARS = 50, 10
 PLANS = {"zero change": 12, "+100 conifers": 24, "+100 deciduous": 20, "−100": 2}
-SNOW_PLANS = {name: PLANS[name] for name in ("zero change", "+100 conifers", "+100 deciduous")}
-SNOW_SITES = 16  # with three plans they fill three blocks of sixteen lanes
-
-#: Densities of the snow [kg m-3], under a closed canopy and in the open: those in use, 10 % off, other published ones.
-SHELTERED, OPEN = (sim.CONSTANTS[f"snow_density_{where}"].low for where in ("sheltered", "open"))
-SNOWS = {
-    "in use": (SHELTERED, OPEN),
-    "sheltered −10 %": (0.9 * SHELTERED, OPEN),
-    "sheltered +10 %": (1.1 * SHELTERED, OPEN),
-    "open −10 %": (SHELTERED, 0.9 * OPEN),
-    "open +10 %": (SHELTERED, 1.1 * OPEN),
-    "alike": (SHELTERED, SHELTERED),
-    "fresh and light": (170.0, 180.0),
-    "windy": (SHELTERED, 250.0),
-}
-JUDGED = tuple(name for name in SNOWS if "10 %" in name)
 ZERO_CHANGE = Band(-3.0, 3.0)  # how far a constant moved by 10 % may move the return of zero change
 
 #: Name -> arguments of `sim.Stands`.
@@ -41,11 +25,10 @@ WORLDS = {
 
 BALANCE = Band(-5.0, 5.0)  # mean heat into a boundary that is in balance [MJ m-2 yr-1]
 BALANCE_YEARS = 10
-DENSITY = "snow density is a constant of the cover: it does not age, settle or drift"
 
 
 def report(sites: int, quick: bool = False) -> Part:
-    """Variance of the thaw return on `sites` sites; snow on some of them; the signs that were stored.
+    """Variance of the thaw return on `sites` sites; how often measures of thaw agree; the signs that were stored.
 
     quick : fewer years, and no look at what is stored.
     """
@@ -57,8 +40,7 @@ def report(sites: int, quick: bool = False) -> Part:
     rows, within = zip(*(_variance(name, episodes) for name, episodes in played.items()), strict=True)
     boundary, heat = balanced_boundary.run_held(sampled, seeds, BALANCED_WORLD["weather"])
     shift = np.abs(boundary - [site[BOUNDARY] for site in sampled])
-    snow_rows, misses = _snow(sampled[:SNOW_SITES], seeds[:SNOW_SITES], years)
-    signs, sign_misses = _signs(quick)
+    signs, misses = _signs(quick)
     low, middle, high = (number(value, 1) for value in np.percentile(heat, [5, 50, 95]))
     header = ["world", "zero change", "s.d. over sites", "site", "policy", "site x policy", "years clipped"]
     text = f"""The thaw return over {years} years, as rewarded, on {sites} sampled sites with their own first stands; a
@@ -78,14 +60,8 @@ Plans are means less zero change ± standard errors over sites.
 
 {thaw_agreement.text({name: episodes.record for name, episodes in played.items()}, list(PLANS))}
 
-The density of snow is constant under a canopy and in the open. The same return on {min(sites, SNOW_SITES)} of the sites
-with other densities; a density moved by 10 % misses where it moves zero change by more than
-{number(ZERO_CHANGE.high, 0)} or turns the sign of a species' effect.
-
-{document.table(["densities", "kg m-3", "zero change", *list(SNOW_PLANS)[1:], "verdict"], snow_rows, left=2)}
-
 {signs}"""
-    return Part(text, misses=[*misses, *sign_misses])
+    return Part(text, misses=misses)
 
 
 def _play(sites: list[dict], seeds: list, plans: dict[str, int], years: int, **arguments) -> open_loop.Episodes:
@@ -134,21 +110,6 @@ def _effects(returns: np.ndarray) -> list[str]:
     return [f"{number(mean, 2, sign=True)} ± {number(error, 2)}" for mean, error in zip(means, errors, strict=True)]
 
 
-def _snow(sites: list[dict], seeds: list, years: int) -> tuple[list[list[str]], list[Miss]]:
-    rows, misses, means = [], [], {}
-    for name, (sheltered, in_the_open) in SNOWS.items():
-        constants = {"snow_density_sheltered": sheltered, "snow_density_open": in_the_open}
-        returns = _thaw_returns(_play(sites, seeds, SNOW_PLANS, years, constants=constants), SNOW_PLANS)
-        gains = (returns[:, 1:] - returns[:, :1]).mean(axis=0)
-        means[name] = (float(returns[:, 0].mean()), *gains)
-        found = problems(means["in use"], means[name]) if name in JUDGED else []
-        verdict = "" if name not in JUDGED else f"**MISS**: {', '.join(found)}" if found else IN
-        densities = f"{number(sheltered, 0)}, {number(in_the_open, 0)}"
-        rows.append([name, densities, number(means[name][0], 1), *_effects(returns), verdict])
-        misses += [Miss("sampled sites", f"snow density {name}: {', '.join(found)}", DENSITY)] if found else []
-    return rows, misses
-
-
 def problems(before: tuple[float, float, float], after: tuple[float, float, float]) -> list[str]:
     """What a change did that it should not; returns of zero change and gains of conifers and deciduous trees."""
     moved = after[0] - before[0]
@@ -189,7 +150,7 @@ def signs_found(table: pd.DataFrame, sites: int) -> tuple[str, list[Miss]]:
             Miss(
                 "sites that span the sampled",
                 f"`{level.constant}` = {level.value}: {', '.join(found)}",
-                _process(level),
+                level.group.removeprefix("constants "),
             )
         )
     effects = [
@@ -208,7 +169,3 @@ conifers, {turned["deciduous"]} of deciduous trees. Listed are these, and those 
 
 {listed}"""
     return text, misses
-
-
-def _process(level) -> str:
-    return DENSITY if level.constant.startswith("snow_density") else f"{level.group.removeprefix('constants ')}"

@@ -34,7 +34,7 @@ LIKELY = {
         "sensible heat": "the tower's energy balance is open: H + LE is too small in the record",
         "ground heat": "November and December: the soil froze in the model and loses little afterwards; the record "
         "itself loses heat over the year",
-        "soil temperature": "one surface node below the organic layer, and no ice in that layer: winter's zero curtain",
+        "soil temperature": "one store of water in the organic layer, one surface node below it",
         "albedo": "snow in the crowns changes no albedo; sky light and low sun",
     },
     "US-Prr": {
@@ -45,8 +45,7 @@ LIKELY = {
         "warm skin's rate, where moss lies over ice that takes up the heat; the tower's open balance",
         "sensible heat": "too little heat goes into the ground in summer, so more goes to the air",
         "net radiation": "snow's albedo, and the temperature of the ground's surface",
-        "soil temperature": "no water that freezes in the organic layer: no zero curtain in autumn, no ice to melt in "
-        "May, so the annual wave is too large",
+        "soil temperature": "one store of water in the organic layer: its moss does not dry by itself; snow too thin",
         "albedo": "crowns hide the snow at a low sun, and the snow on them changes no albedo; the thin snow of "
         "autumn is soon gone",
     },
@@ -216,7 +215,7 @@ daytime partitioning; the night-time one gives GPP of 0.7-1.4 gC m⁻² day⁻¹
 the sum of its four components (the published sum differs from it by up to 39 W m⁻² in months of 2011-13). From June
 to August LE/(LE + H) is {number(measured)} measured, {number(modelled)} modelled. Soil was measured 5 cm below the
 14 cm of moss, {SENSOR_DEPTH_M:g} m below the surface and within the 0.30 m of organic layer; the model's is taken
-there, from the top of the mineral soil, the day's ground heat and the layer's conductivity.
+there, between its surface, its middle and the top of the mineral soil.
 
 {_ground_heat_text(comparison, closed)}
 
@@ -291,14 +290,15 @@ def _spring_text(spread: Comparison, measured: Comparison) -> str:
     march = fluxes.index.month == 3
     depth = fluxes.loc[march, "snow_depth_cm"].mean()
     water = [number(0.01 * depth * density, 0) for density in SNOW_DENSITY]
-    modelled = measured.modelled.loc[fluxes.index[march], "swe_mm"].mean()
+    modelled = measured.modelled.loc[fluxes.index[march]]
+    swe, deep = modelled["swe_mm"].mean(), modelled["snow_depth_m"].mean()
     return f"""The spring of 2013 was measured in half-hours. The same run with them in place of the spread days:
 
 {document.table(header, rows)}
 
 Snow lay {number(depth, 0)} cm deep in March 2013, {water[0]}-{water[1]} mm of water at
 {SNOW_DENSITY[0]:g}-{SNOW_DENSITY[1]:g} kg m⁻³ (Ikawa et al. 2024; Sturm et al. 2010); the model has
-{number(modelled, 0)} mm."""
+{number(swe, 0)} mm, {number(100.0 * deep, 0)} cm deep, {number(swe / deep, 0)} kg m⁻³."""
 
 
 def _mostly_measured(fluxes: pd.DataFrame, name: str) -> pd.Series:
