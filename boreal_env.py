@@ -151,7 +151,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, soil and wood products over `carbon_scale`,
     less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2. Ready beside
     them is thaw as the field measures it: "active_layer", 1 - thaw depth / 1 m, and "permafrost_heat",
-    -1 - heat of the upper 3 m / 150 MJ/m2 (1 is frozen through, -1 thawed). Any other objective is a function of the
+    -1 - heat of the upper 3 m / 135 MJ/m2 (1 is frozen through, -1 thawed). Any other objective is a function of the
     year's record: `objectives=("carbon", "active_layer", Objective("timber", value, 0, 1))`.
     The preference has a weight for each, none negative, 1 in sum; of two it is given as one number, the first's.
 

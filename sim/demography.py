@@ -159,17 +159,26 @@ def weaken(stems, sizes, lane, deaths, suppressed):
     return died, min(lost / carbon, 1.0)
 
 
+@compiled
+def background_deaths(stems, sizes, lane, rate, suppressed, reference) -> float:
+    """Stems of a species that die in a year without crowding [ha-1]: of the reference size the share `rate`, of others
+    more or less as 1 / (suppressed + size), whoever stands beside them."""
+    deaths = 0.0
+    for age in range(AGES):
+        deaths += stems[age, lane] * min(rate * (suppressed + reference) / (suppressed + sizes[age, lane]), 1.0)
+    return deaths
+
+
 @phase
 def kill_small(b, i, conifers, deciduous):
-    """Let shares of a lane's conifers and deciduous stems die, small ones first; their carbon goes to the soil."""
+    """Let so many of a lane's stems of each species die [ha-1], small ones first; their carbon goes to the soil."""
     s, p, w = b.s, b.p, b.w
-    living_conifers, living_deciduous = count_stand(b, i)
     suppressed = p.suppressed_stem_size[i]
-    died, lost = weaken(s.conifer_stems, w.conifer_size, i, conifers * living_conifers, suppressed)
+    died, lost = weaken(s.conifer_stems, w.conifer_size, i, conifers, suppressed)
     carbon = lost * s.conifer_biomass[i]
     s.conifer_biomass[i] -= carbon
     bury(b, i, died, carbon)
-    died, lost = weaken(s.deciduous_stems, w.deciduous_size, i, deciduous * living_deciduous, suppressed)
+    died, lost = weaken(s.deciduous_stems, w.deciduous_size, i, deciduous, suppressed)
     carbon = lost * s.deciduous_biomass[i]
     s.deciduous_biomass[i] -= carbon
     bury(b, i, died, carbon)
@@ -241,9 +250,16 @@ def renew_stems(b, i):
         p.density_mortality_threshold[i],
         p.density_dependent_mortality[i],
     )
-    conifers_die = min(background * p.mortality_conifer[i] + crowding, 1.0)
-    deciduous_die = min(background * p.mortality_deciduous[i] + crowding, 1.0)
-    kill_small(b, i, conifers_die, deciduous_die)
+    suppressed, reference = p.suppressed_stem_size[i], p.reference_stem_size[i]
+    conifers_die = background_deaths(
+        s.conifer_stems, w.conifer_size, i, background * p.mortality_conifer[i], suppressed, reference
+    )
+    deciduous_die = background_deaths(
+        s.deciduous_stems, w.deciduous_size, i, background * p.mortality_deciduous[i], suppressed, reference
+    )
+    kill_small(
+        b, i, min(conifers_die + crowding * conifers, conifers), min(deciduous_die + crowding * deciduous, deciduous)
+    )
 
     cover = w.cover_conifer[i] + w.cover_deciduous[i]
     new = recruits(density, cover, p.max_natural_density[i], p.recruitment_rate[i], p.recruits_per_stem[i])

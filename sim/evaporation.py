@@ -62,7 +62,9 @@ def ground_vapour(b, seconds):
         saturated = saturation_pressure(surface)
         # The windless exchange moves vapour off the moss, too: it stands for eddies that reach the floor in gusts.
         exchange = max(w.ground_exchange[i], p.minimum_conductance[i] / (w.air_density[i] * AIR_HEAT_CAPACITY))
-        moss = moss_conductance(exchange, wetness(b, i), p.moss_resistance[i]) if s.ground[i] > 0.0 else 0.0
+        # All is loaded before it is chosen from, as in `sim.wind.wind_exchange`.
+        moss = moss_conductance(exchange, wetness(b, i), p.moss_resistance[i])
+        moss = moss if s.ground[i] > 0.0 else 0.0
         conductance = w.ground_exchange[i] if snow else moss
         # Roots of the understorey and capillary rise tie the layer to the soil below it: both give, by what they have.
         layer = liquid_water(b, i)

@@ -78,7 +78,7 @@ def canopy_capacities(b):
         # Snow lands on shoots rather than on needles, and sees less plant area than light does.
         thinner = p.snow_extinction_factor[i]
         caught = w.cover_conifer[i] * (1.0 - exponential(-w.optical_conifer[i] * thinner)) + w.cover_deciduous[i] * (
-            1.0 - exponential(-w.optical_deciduous[i] * thinner)
+            1.0 - exponential(-w.snow_optical_deciduous[i] * thinner)
         )
         w.snow_efficiency[i] = caught * p.interception[i]
         capacity = p.rain_capacity_mm[i] * w.snow_area[i] * p.interception[i]

@@ -1,7 +1,7 @@
 """Thaw as the field measures it: thaw depth, heat and temperature of the upper ground, temperature of the permafrost.
 
-Diagnostics of the year: nothing here acts on anything. The upper ground is the soil to `UPPER_GROUND_M`, with all that
-lies on it and stores heat as soil does.
+Diagnostics of the year: nothing here acts on anything. The upper ground is the mineral soil to
+`UPPER_GROUND_M`.
 """
 
 import math
@@ -84,8 +84,9 @@ def temperature_at(depth, top, surface, deep, boundary, surface_depth, deep_node
 
 @compiled
 def upper_ground_heat(b, i) -> float:
-    """Heat of the upper ground [J m-2], 0 where it is thawed and at 0 degC: of organic layer and surface node, and
-    what the deep node's temperature says of the soil between it and `UPPER_GROUND_M`."""
+    """Heat of the upper ground [J m-2], 0 where it is thawed and at 0 degC: the surface node's, and what the deep
+    node's temperature says of the soil between it and `UPPER_GROUND_M`. The organic layer is left out: more of it would
+    count as colder ground."""
     s, p, w = b.s, b.p, b.w
     depth = p.surface_soil_depth_m[i]
     thawed, frozen = p.soil_heat_capacity_thawed[i], p.soil_heat_capacity_frozen[i]
@@ -93,7 +94,7 @@ def upper_ground_heat(b, i) -> float:
     latent, span = w.surface_latent[i] / depth, p.soil_freezing_range_k[i]
     deep = temperature(s.deep_heat[i], w.deep_thawed[i], w.deep_frozen[i], w.deep_latent[i], span)
     below = max(UPPER_GROUND_M - depth, 0.0)
-    return s.organic_heat[i] + s.surface_heat[i] + below * enthalpy(deep, thawed, frozen, latent, span)
+    return s.surface_heat[i] + below * enthalpy(deep, thawed, frozen, latent, span)
 
 
 @phase

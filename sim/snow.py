@@ -102,7 +102,9 @@ def settle_snow(b, steps):
             p.snow_metamorphism_by_density[i],
             p.snow_metamorphism_density[i],
         )
-        s.snow_density[i] = min(s.snow_density[i] * (1.0 + SECONDS_PER_DAY * gain), p.snow_density_largest[i])
+        settled = min(s.snow_density[i] * (1.0 + SECONDS_PER_DAY * gain), p.snow_density_largest[i])
+        fresh = p.snow_density_fresh[i]
+        s.snow_density[i] = settled if s.swe[i] > 0.0 else fresh  # of the snow that is to come
 
 
 @compiled

@@ -105,7 +105,10 @@ def leaves(b, day):
         )
         w.lai_conifer[i] = green_conifer * w.cover_conifer[i]
         w.lai_deciduous[i] = green_deciduous * w.cover_deciduous[i]
-        w.snow_area[i] = w.cover_conifer[i] * area_conifer + w.cover_deciduous[i] * area_deciduous
+        # Branches catch less snow than light (aspen 13 %, Pomeroy et al. 1998): no more than the site's wood counts.
+        snow_deciduous = area_deciduous - wood_deciduous + min(wood_deciduous, p.woody_area_index[i])
+        w.snow_optical_deciduous[i] = p.light_extinction[i] * snow_deciduous
+        w.snow_area[i] = w.cover_conifer[i] * area_conifer + w.cover_deciduous[i] * snow_deciduous
 
 
 @phase

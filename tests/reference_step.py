@@ -287,7 +287,9 @@ def structure(p, s, day):
     leaf = {"conifer": p.max_lai_conifer, "deciduous": out * p.max_lai_deciduous}
     wood = {"conifer": p.woody_area_index, "deciduous": p.woody_area_deciduous * p.woody_area_index}
     bare = {"conifer": wood["conifer"], "deciduous": p.leafless_share * p.max_lai_deciduous + wood["deciduous"]}
-    stand = SimpleNamespace(share={}, covered={}, leaf_share={}, depth={}, lai={}, light_use={}, plant_area=0.0)
+    stand = SimpleNamespace(
+        share={}, covered={}, leaf_share={}, depth={}, snow_depth={}, lai={}, light_use={}, plant_area=0.0
+    )
     area = {species: crowns(p, s, species) for species in SPECIES}
     stand.crowns = sum(crown for crown, _ in area.values())
     stand.cover = 1.0 - math.exp(-stand.crowns)
@@ -301,7 +303,9 @@ def structure(p, s, day):
         stand.depth[species] = p.light_extinction * plant
         stand.lai[species] = leaf[species] * stand.covered[species]
         stand.light_use[species] = of(p, "light_use", species) * (1.0 - old_share * (1.0 - p.light_use_old))
-        stand.plant_area += plant * stand.covered[species]
+        catching = plant - max(wood[species] - p.woody_area_index, 0.0)
+        stand.snow_depth[species] = p.light_extinction * catching
+        stand.plant_area += catching * stand.covered[species]
     return stand
 
 
@@ -518,7 +522,7 @@ def intercepted(fall, store, capacity, efficiency):
 def snow_efficiency(p, stand):
     """c."""
     return p.interception * sum(
-        stand.covered[species] * (1.0 - math.exp(-p.snow_extinction_factor * stand.depth[species]))
+        stand.covered[species] * (1.0 - math.exp(-p.snow_extinction_factor * stand.snow_depth[species]))
         for species in SPECIES
     )
 
@@ -953,7 +957,9 @@ def renew_stems(p, s):
     renewed, dead, shares = {}, 0.0, {}
     for species in SPECIES:
         stems, sizes = getattr(s, f"{species}_stems"), relative_sizes(p, species)
-        number = min(p.natural_mortality * of(p, "mortality", species) + self_thinning, 1.0) * stems.sum()
+        hazard = p.natural_mortality * of(p, "mortality", species)
+        hazard *= (p.suppressed_stem_size + p.reference_stem_size) / (p.suppressed_stem_size + sizes)
+        number = min(stems @ np.minimum(hazard, 1.0) + self_thinning * stems.sum(), stems.sum())
         die = deaths_by_age(p, stems, sizes, number)
         shares[species] = die @ sizes / (stems @ sizes) if stems.sum() > 0.0 else 0.0
         dead += shares[species] * getattr(s, f"{species}_biomass")
@@ -1093,7 +1099,10 @@ def take_step(p, s, today, step, steps_per_day):
         "ground": (heat - FUSION * melted) / (p.skin_heat_capacity + ICE_HEAT * snow_left),
         "organic_heat": organic_heat - WATER_HEAT * drained * max(organic_now, 0.0),
         "organic_water": organic_water - drained,
-        "surface_heat": s.surface_heat + seconds * surface_gain + passed,
+        "surface_heat": s.surface_heat
+        + seconds * surface_gain
+        + passed
+        + WATER_HEAT * drained * (max(organic_now, 0.0) - max(surface_start, 0.0)),
         "deep_heat": s.deep_heat + seconds * deep_gain,
         "swe": snow_left,
         "snow_density": snow_density(s, aloft.to_ground, fresh_snow_density(p, air, floor_wind(p, s, air, today))),

@@ -62,7 +62,7 @@ def test_thaw_as_the_field_measures_it_is_ready():
     y = info["years"]
     depth, heat = y["active_layer_depth_m"], y["upper_ground_heat_mj_m2"]
     np.testing.assert_allclose(rewards[:, 1], np.clip(1.0 - depth, -1.0, 1.0), rtol=1e-6)
-    np.testing.assert_allclose(rewards[:, 2], np.clip(-1.0 - heat / 150.0, -1.0, 1.0), rtol=1e-6)
+    np.testing.assert_allclose(rewards[:, 2], np.clip(-1.0 - heat / 135.0, -1.0, 1.0), rtol=1e-6)
     assert info["active_layer_return"] == pytest.approx(y["active_layer_reward"].sum())
     assert pickle.loads(pickle.dumps(env)).objective_names == ("thaw", "active_layer", "permafrost_heat")
     with pytest.raises(ValueError, match="each is allowed once"):

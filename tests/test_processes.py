@@ -897,6 +897,16 @@ def test_small_stems_die_first():
     assert lost < 0.25 * 50.0 / 1700.0
 
 
+def test_seedlings_beside_it_do_not_keep_an_old_tree_alive():
+    old = stems(age80=400.0)
+    alone = demography.background_deaths(old, SIZES, 0, 0.025, 0.05, 0.06)
+    assert alone == approx(400.0 * 0.025 * 0.11 / (0.05 + SIZES[80, 0]))
+    planted = stems(age80=400.0, age0=100.0)
+    before = planted.copy()
+    demography.weaken(planted, SIZES, 0, demography.background_deaths(planted, SIZES, 0, 0.025, 0.05, 0.06), 0.05)
+    assert before[80, 0] - planted[80, 0] == approx(alone)
+
+
 def test_an_age_loses_no_more_than_its_stems():
     trees = stems(age5=10.0, age30=500.0, age101=200.0)
     died, lost = demography.weaken(trees, SIZES, 0, 400.0, 0.05)

@@ -205,9 +205,9 @@ class Objective:
 #: Thaw depth [m] at which "active_layer" gives nothing; twice that gives -1.
 THAW_DEPTH_SCALE_M = 1.0
 
-#: Heat of the upper 3 m [MJ m-2] that "permafrost_heat" counts in: organic layer and 3 m of soil, frozen at about
-#: -4 degC, hold twice as much less than thawed ground, and give 1, thawed ground of 0 degC gives -1.
-UPPER_GROUND_HEAT_SCALE = 150.0
+#: Heat of the upper 3 m [MJ m-2] that "permafrost_heat" counts in: 3 m of soil frozen at about -2 degC hold twice as
+#: much less than thawed soil, and give 1, thawed soil of 0 degC gives -1.
+UPPER_GROUND_HEAT_SCALE = 135.0
 
 
 def shallow_thaw(year: dict[str, np.ndarray]) -> np.ndarray:
