@@ -16,7 +16,6 @@ from sim.physical_constants import (
     LATENT_HEAT_FUSION,
     LATENT_HEAT_SUBLIMATION,
     LATENT_HEAT_VAPORISATION,
-    WATER_HEAT_CAPACITY,
 )
 from sim.radiation import black_body, black_body_slope, longwave_down, longwave_up
 from sim.snow import ground_capacity
@@ -58,10 +57,9 @@ def move_heat_and_water(b, seconds):
         melted, carried = warm_ground(b, i, ground_longwave, heat, vapour, seconds)
         warm_soil_and_trunk(b, i, heat, seconds)
         from_layer = w.layer_share[i] * vapour.floor
-        drained, brought, warmth = wet_organic_layer(b, i, w.infiltration[i], melted, from_layer)
-        lost = warm_soil_by_drainage(b, i, drained, warmth)
+        drained, carried_by_water = wet_organic_layer(b, i, w.infiltration[i], melted, from_layer)
         excess = fill_soil(b, i, vapour, drained - (vapour.floor - from_layer))
-        advected = w.advected[i] - carried + brought - lost
+        advected = w.advected[i] - carried + carried_by_water
         cross_boundary(b, i, net_radiation, heat, vapour, excess, advected, seconds)
         add_step(b, i, net_radiation, heat, vapour, excess, advected, seconds)
 
@@ -154,15 +152,6 @@ def warm_soil_and_trunk(b, i, heat, seconds):
     passed = warm_organic_layer(b, i, gained, surface, w.ground_new[i])
     s.surface_heat[i] += seconds * (heat.organic_to_surface - heat.surface_to_deep) + passed
     s.deep_heat[i] += seconds * (heat.surface_to_deep - heat.deep_to_boundary)
-
-
-@compiled
-def warm_soil_by_drainage(b, i, drained, warmth) -> float:
-    """Let water [mm] that drains from the organic layer leave its heat [J m-2] in the surface soil, down to its warmth;
-    returns what it takes on, into the bucket, which has no temperature of its own."""
-    lost = WATER_HEAT_CAPACITY * max(b.w.surface[i], 0.0) * drained
-    b.s.surface_heat[i] += warmth - lost
-    return lost
 
 
 @compiled

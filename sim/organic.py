@@ -148,8 +148,7 @@ def drained(water, frozen, held) -> float:
 def wet_organic_layer(b, i, rain, melted, evaporated):
     """Let rain and melt into a lane's organic layer, and evaporation and drainage out of it, each with its heat.
 
-    Amounts in mm. Returns what drains; the heat that rain brought, less what vapour took; and what drainage took along
-    [J m-2].
+    Amounts in mm. Returns what drains, and the heat that water brought, less what it took along [J m-2].
     """
     s, p, w = b.s, b.p, b.w
     before = max(w.organic[i], 0.0)
@@ -163,4 +162,4 @@ def wet_organic_layer(b, i, rain, melted, evaporated):
     taken = WATER_HEAT_CAPACITY * max(now, 0.0) * away
     s.organic_water[i] = water - away
     s.organic_heat[i] -= taken
-    return away, brought, taken
+    return away, brought - taken

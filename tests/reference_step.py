@@ -1099,10 +1099,7 @@ def take_step(p, s, today, step, steps_per_day):
         "ground": (heat - FUSION * melted) / (p.skin_heat_capacity + ICE_HEAT * snow_left),
         "organic_heat": organic_heat - WATER_HEAT * drained * max(organic_now, 0.0),
         "organic_water": organic_water - drained,
-        "surface_heat": s.surface_heat
-        + seconds * surface_gain
-        + passed
-        + WATER_HEAT * drained * (max(organic_now, 0.0) - max(surface_start, 0.0)),
+        "surface_heat": s.surface_heat + seconds * surface_gain + passed,
         "deep_heat": s.deep_heat + seconds * deep_gain,
         "swe": snow_left,
         "snow_density": snow_density(s, aloft.to_ground, fresh_snow_density(p, air, floor_wind(p, s, air, today))),
