@@ -270,7 +270,8 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
     yield "stems by age", stems, 0.0, np.inf
     yield "soil_water", s["soil_water"], 0.0, p["max_water_content_mm"] * rounded
     yield "organic_water", s["organic_water"], 0.0, np.inf
-    yield "snow_density", s["snow_density"], p["snow_density_least"] / rounded, np.inf
+    lightest = np.minimum(p["snow_density_least"], p["snow_density_fresh"])  # also where no snow lies
+    yield "snow_density", s["snow_density"], lightest / rounded, np.inf
     wood = p["woody_area_index"] * np.maximum(p["woody_area_deciduous"], 1.0)
     plant_area = p["max_lai_conifer"] + p["max_lai_deciduous"] * (1.0 + p["leafless_share"]) + wood
     yield "canopy_rain", s["canopy_rain"], 0.0, p["rain_capacity_mm"] * plant_area * rounded
