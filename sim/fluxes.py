@@ -98,6 +98,7 @@ def conduct(b, i):
         w.deep_conductance[i] * (surface - deep),
         w.boundary_conductance[i] * (deep - boundary_temperature(b, i)),
     )
+    w.surface_new[i] = surface
     w.soil_top[i] = surface + heat.organic_to_surface * w.upper_soil[i]
     return heat
 
@@ -145,11 +146,8 @@ def warm_soil_and_trunk(b, i, heat, seconds):
     s, w = b.s, b.w
     s.canopy[i] = w.trial[i]
     s.trunk[i] += seconds * (heat.canopy_to_trunk - heat.trunk_to_air - heat.trunk_to_ground) / s.trunk_capacity[i]
-    surface = w.surface_base[i] + w.surface_by_organic[i] * (
-        w.organic_base[i] + w.organic_by_ground[i] * w.ground_new[i]
-    )
     gained = seconds * (heat.ground_to_organic - heat.organic_to_surface)
-    passed = warm_organic_layer(b, i, gained, surface, w.ground_new[i])
+    passed = warm_organic_layer(b, i, gained, w.surface_new[i], w.ground_new[i])
     s.surface_heat[i] += seconds * (heat.organic_to_surface - heat.surface_to_deep) + passed
     s.deep_heat[i] += seconds * (heat.surface_to_deep - heat.deep_to_boundary)
 

@@ -9,16 +9,17 @@ from statistics import NormalDist
 
 import numpy as np
 
-from sim import organic, soil
+from sim import organic, soil, structure
 from sim.demography import AGE_CLASSES, AGES, OLDEST, first_ages, stem_weight
 from sim.jit import uncompiled
 from sim.parameters import SITE_PARAMETERS, check_mapping
-from sim.physical_constants import FREEZING_POINT_K, WATER_DENSITY
+from sim.physical_constants import FREEZING_POINT_K, SQUARE_METRES_PER_HECTARE, WATER_DENSITY
 from sim.state import DAYS, STATE
 
 enthalpy, temperature = uncompiled(soil.enthalpy), uncompiled(soil.temperature)
 node_capacities = uncompiled(soil.node_capacities)
 layer_capacities = uncompiled(organic.layer_capacities)
+crown_factor = uncompiled(structure.crown_factor)
 
 SPIN_UP_YEARS = 8
 SPIN_UP_STEPS_PER_DAY = 12
@@ -116,16 +117,10 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         stems = stocks["density_stems_ha"] * shares[:, None] * ages
     conifers, deciduous = stems
     density = stems.sum()
-    mix = conifers.sum() / density if density > 0.0 else stocks["conifer_fraction"]
     carbon = (stems * sizes).sum(axis=1)
-    conifer_biomass = biomass * (carbon[0] / carbon.sum() if density > 0.0 else mix)
+    conifer_biomass = biomass * (carbon[0] / carbon.sum() if density > 0.0 else stocks["conifer_fraction"])
 
-    crowns = 1.0 - math.exp(-density * 1e-4 * parameters["crown_area_conifer_m2"])
-    depth = (
-        crowns * (mix * parameters["organic_depth_conifer_m"] + (1.0 - mix) * parameters["organic_depth_deciduous_m"])
-        + (1.0 - crowns) * parameters["organic_depth_open_m"]
-    )
-    depth = stocks.get("organic_layer_m", depth)
+    depth = stocks.get("organic_layer_m", organic_depth_in_balance(stems, parameters))
     organic_water = 0.4 * WATER_DENSITY * (parameters["moss_water_held"] + parameters["humus_water_held"]) * depth
     mean = parameters["mean_annual_temperature_c"]
     boundary = parameters["deep_boundary_temperature_k"] - FREEZING_POINT_K
@@ -150,6 +145,20 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         "acclimation": winter,
     }
     return np.concatenate([list(state.values()), conifers, deciduous])
+
+
+def organic_depth_in_balance(stems: np.ndarray, parameters: dict) -> float:
+    """Depth [m] of the organic layer in balance with the crowns of these stems by species and age, shape (2, AGES)."""
+    crowns = np.zeros(2)
+    for k, species in enumerate(("conifer", "deciduous")):
+        grown_as = species if parameters["crown_development"] else "conifer"
+        factors = [parameters[f"crown_{grown_as}_{size}"] for size in AGE_CLASSES]
+        relative = np.array([crown_factor(age, *factors) for age in range(AGES)])
+        crowns[k] = stems[k] @ relative * parameters[f"crown_area_{species}_m2"] / SQUARE_METRES_PER_HECTARE
+    area = crowns.sum()
+    cover = (1.0 - math.exp(-area)) * crowns / area if area > 0.0 else crowns
+    depths = np.array([parameters["organic_depth_conifer_m"], parameters["organic_depth_deciduous_m"]])
+    return float(cover @ depths + (1.0 - cover.sum()) * parameters["organic_depth_open_m"])
 
 
 def drawn_stocks(dice: dict, given: dict, ranges: dict) -> dict[str, float]:

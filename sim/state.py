@@ -226,7 +226,7 @@ top_of_canopy top_sum transpiration_conifer transpiration_deciduous trial trunk_
 trunk_by_ground trunk_canopy trunk_ground unloading_rate upper_soil vapour vapour_density water_before water_gain
 water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_down winter_up wood_rate
 floor_water layer_share organic organic_base organic_by_ground organic_conductance organic_sum surface_by_organic
-snow_optical_deciduous thaw_water wind
+snow_optical_deciduous surface_new thaw_water wind
 co2_growth co2_stomata dry_air_conifer dry_air_deciduous efficiency_conifer efficiency_deciduous efficiency_understorey
 gpp_understorey mean_deficit photons ready_conifer ready_deciduous
 """.split()

@@ -8,6 +8,7 @@ what the ground evaporates.
 from sim.jit import compiled, phase
 from sim.mathematics import exponential
 from sim.photosynthesis import photosynthesis
+from sim.snow import snow_depth
 
 
 @compiled
@@ -25,9 +26,9 @@ def absorbed_share(area, extinction, path) -> float:
 @phase
 def understorey_light(b):
     """The day's efficiency of the understorey, per shortwave below the trees [kgC J-1]; snow of the morning."""
-    s, p, w = b.s, b.p, b.w
-    for i in range(len(s.swe)):
-        area = p.understorey_lai[i] * above_snow(s.swe[i] / s.snow_density[i], p.understorey_height_m[i])
+    p, w = b.p, b.w
+    for i in range(len(b.s.swe)):
+        area = p.understorey_lai[i] * above_snow(snow_depth(b, i), p.understorey_height_m[i])
         w.efficiency_understorey[i] *= absorbed_share(area, p.light_extinction[i], p.sky_path[i])
 
 
