@@ -16,10 +16,9 @@ import sim
 from sim.block import kernel, lanes_for
 from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS
-from sim.parameters import check_overrides, check_seed
+from sim.parameters import check_name, check_overrides, check_seed
 from sim.stands import available_cores
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
-from sim.task.checks import check_choice
 from sim.task.episodes import (
     BALANCED_WORLD,
     DEFAULT_YEARS,
@@ -225,7 +224,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     def __init__(self, *, render_mode: str | None = None, **kwargs):
         EzPickle.__init__(self, render_mode=render_mode, **kwargs)
         if render_mode is not None:
-            check_choice("render_mode", render_mode, self.metadata["render_modes"])
+            check_name("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self._describe(1, kwargs)
         self.observation_space = self._episodes.observation_space
@@ -368,7 +367,7 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
 
     def call(self, name: str, *args, **kwargs) -> tuple:
         """A method of every environment, as with gymnasium's AsyncVectorEnv: here `action_masks` only."""
-        check_choice("method", name, ("action_masks",))
+        check_name("method", name, ("action_masks",))
         return tuple(self.action_masks())
 
     def get_state(self) -> dict:
