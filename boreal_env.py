@@ -163,8 +163,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `boreal-balanced-v0` is the task to study policies with: the ground below is in balance with the climate and the
     first stand above it, the soil's carbon with its litter, weather varies from day to day as on record, and both
     returns vary equally between policies. `boreal-generalist-v0` and `boreal-site-specific-v0` are the paper's: use
-    them to compare with it. There the boundary's temperature is drawn without regard to the climate, and so which site was
-    drawn decides nearly all of the thaw return.
+    them to compare with it. There the boundary's temperature is drawn without regard to the climate, and so which
+    site was drawn decides nearly all of the thaw return.
 
     ## Episode Termination
     After 50 years the episode is terminated: nothing is worth anything beyond.
