@@ -16,10 +16,9 @@ import sim
 from sim.block import kernel, lanes_for
 from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS
-from sim.parameters import check_overrides, check_seed
+from sim.parameters import check_name, check_overrides, check_seed
 from sim.stands import available_cores
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
-from sim.task.checks import check_choice
 from sim.task.episodes import (
     BALANCED_WORLD,
     DEFAULT_YEARS,
@@ -138,7 +137,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `Box` of 105 values (generalist) or 43 (site-specific, without the 62 site parameters), float32;
     `boreal_env.OBSERVATION` has the name, unit, normalisation and limits of each, `observation_names` the names of
     those that this environment gives. The first is the preference for carbon (of m objectives the weights of the first
-    m - 1, of one none); pairs of years have the last year first; age fractions are of all stems.
+    m - 1; a single objective has none). Of two years the last comes first. Age fractions are of all stems.
 
     ## Action Space
     `Discrete(25)`: action = 5 x density index + mix index; density changes (-100, -50, 0, 50, 100) stems/ha, conifer
@@ -149,10 +148,11 @@ class BorealEnv(Described, gym.Env, EzPickle):
 
     ## Reward Space
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, soil and wood products over `carbon_scale`,
-    less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2. Ready beside
-    them is thaw as the field measures it: "active_layer", 1 - thaw depth / 1 m, and "permafrost_heat",
-    -1 - heat of the upper 3 m / 135 MJ/m2 (1 is frozen through, -1 thawed). Any other objective is a function of the
-    year's record: `objectives=("carbon", "active_layer", Objective("timber", value, 0, 1))`.
+    less penalties. Thaw: a year's heat up through a boundary of fixed temperature, 12 m deep, less 2.5 times the heat
+    down through it, over 40 MJ/m2. Ready beside them is thaw as the field measures it: "active_layer", 1 - thaw depth /
+    1 m, and "permafrost_heat", -1 - heat of the upper 3 m / 135 MJ/m2 (1 is frozen at -2 degC, -1 thawed at 0 degC).
+    Any other objective is a function of the year's record:
+    `objectives=("carbon", "active_layer", Objective("timber", value, 0, 1))`.
     The preference has a weight for each, none negative, 1 in sum; of two it is given as one number, the first's.
 
     ## Starting State
@@ -162,9 +162,9 @@ class BorealEnv(Described, gym.Env, EzPickle):
     ## Which Id
     `boreal-balanced-v0` is the task to study policies with: the ground below is in balance with the climate and the
     first stand above it, the soil's carbon with its litter, weather varies from day to day as on record, and both
-    returns vary alike between policies. `boreal-generalist-v0` and `boreal-site-specific-v0` are the paper's: use them
-    to compare with it. There the boundary's temperature is drawn without regard to the climate, and so which site was
-    drawn decides nearly all of the thaw return.
+    returns vary equally between policies. `boreal-generalist-v0` and `boreal-site-specific-v0` are the paper's: use
+    them to compare with it. There the boundary's temperature is drawn without regard to the climate, and so which
+    site was drawn decides nearly all of the thaw return.
 
     ## Episode Termination
     After 50 years the episode is terminated: nothing is worth anything beyond.
@@ -225,7 +225,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     def __init__(self, *, render_mode: str | None = None, **kwargs):
         EzPickle.__init__(self, render_mode=render_mode, **kwargs)
         if render_mode is not None:
-            check_choice("render_mode", render_mode, self.metadata["render_modes"])
+            check_name("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self._describe(1, kwargs)
         self.observation_space = self._episodes.observation_space
@@ -368,7 +368,7 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
 
     def call(self, name: str, *args, **kwargs) -> tuple:
         """A method of every environment, as with gymnasium's AsyncVectorEnv: here `action_masks` only."""
-        check_choice("method", name, ("action_masks",))
+        check_name("method", name, ("action_masks",))
         return tuple(self.action_masks())
 
     def get_state(self) -> dict:

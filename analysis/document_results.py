@@ -1,9 +1,9 @@
-"""Writes the measured results into README.md, docs/algorithms/*.md and docs/learning.md, from the archived runs.
+"""Writes what was measured into README.md and docs/: archived runs, results/benchmark.csv, docs/validation.md.
 
     python analysis/document_results.py
 
 Each page has a pair of comments, `<!-- results of ppo_gated -->` and `<!-- end of results -->`; what is between them
-is made here, so that no page shows a number that the runs do not give.
+is made here, so that no page shows a number that was not measured.
 """
 
 import re
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import experiments, methods, metrics, paths
+from analysis import excerpts, experiments, methods, metrics, paths
 from analysis.experiments import GENERALIST
 from analysis.results import Results
 from analysis.tables import distance_to_best, main_results, single_sites
@@ -24,6 +24,7 @@ from cleanrl_style import protocol
 PAGES = (
     "README.md",
     "docs/learning.md",
+    "docs/performance.md",
     *(f"docs/algorithms/{name}.md" for name in (*methods.TRAINED, "heuristics")),
 )
 SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
@@ -148,7 +149,9 @@ def sites_alone(results: Results) -> str:
 
 
 def section(results: Results, name: str) -> str:
-    """What stands between the comments: of all methods, of the heuristics, of one script, or one of two tables."""
+    """What stands between the comments: of all methods, of the heuristics, of one script, or another table."""
+    if name in EXCERPTS:
+        return EXCERPTS[name]()
     if name in TABLES:
         return TABLES[name](results)
     rows = []
@@ -170,6 +173,7 @@ def section(results: Results, name: str) -> str:
 
 
 TABLES = {"distances": distances, "single_sites": sites_alone}
+EXCERPTS = {"speed": excerpts.speed, "shares": excerpts.shares, "towers": excerpts.towers}
 
 
 def main(args: Args) -> None:

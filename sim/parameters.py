@@ -8,6 +8,7 @@ unit and a source, and both are passed to the compiled physics at run time: chan
 import csv
 import difflib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from numbers import Real
@@ -191,8 +192,8 @@ def check_weather(weather: str) -> dict[str, bool]:
     return {"weather_as_observed": check_name("weather", weather, WEATHERS) == "observed"}
 
 
-def check_name(what: str, value, allowed: tuple[str, ...]) -> str:
-    """One of the names that are allowed."""
+def check_name(what: str, value, allowed: Sequence[str]) -> str:
+    """The value, which has to be one of the names that are allowed."""
     if not isinstance(value, str) or value not in allowed:
         raise ValueError(f"{what} {value!r}: allowed are {', '.join(allowed)}")
     return value

@@ -36,8 +36,9 @@ def thaw_depth(
     First the season melts the ice of the organic layer (organic_latent, J m-2), from above.
 
     Stefan's: what a season's warmth at the ground [K s], `seconds` long, conducts through organic layer and thawed soil
-    melts the water [latent, J m-3], warms thawed soil to half the mean temperature of its top, and goes on into soil
-    as cold as the deep node in the year's mean (Carslaw and Jaeger 1959, 2.4: 2 dT sqrt(k C t / pi)).
+    melts the water [latent, J m-3], warms the thawed soil to a quarter of the ground's mean temperature over the
+    season (its top has half of that, its mean half of the top's), and goes on into soil as cold as the deep node in
+    the year's mean (Carslaw and Jaeger 1959, 2.4: 2 dT sqrt(k C t / pi)).
     Capacities in J m-3 K-1.
     """
     if deep > 0.0:

@@ -5,7 +5,11 @@ import re
 import pytest
 from scripts import ROOT
 
+from analysis import excerpts
+from analysis.document_results import EXCERPTS, SECTION
+
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+VALIDATION = (ROOT / excerpts.VALIDATION).read_text(encoding="utf-8")
 PYTHON = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
@@ -22,3 +26,52 @@ def test_commands_and_links_name_files_that_exist():
     named = set(re.findall(r"python ([\w/]+\.py)", README)) | set(re.findall(r"\]\(([\w/.-]+)\)", README))
     assert len(named) > 20
     assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
+
+
+@pytest.mark.parametrize("name", EXCERPTS)
+def test_excerpts_are_of_what_was_measured_last(name, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    performance = (ROOT / "docs" / "performance.md").read_text(encoding="utf-8")
+    shown = [match[0] for match in SECTION.finditer(README + performance) if match[2] == name]
+    assert shown == [f"<!-- results of {name} -->\n{EXCERPTS[name]()}<!-- end of results -->"]
+
+
+def test_excerpts_read_the_pages():
+    page = """### SE-Svb, north
+
+|  | measured | months: bias | RMSE | r | n | days: bias | RMSE | r | verdict |
+| --- | ---: | --- | --- | --- | --- | --- | --- | --- | --- |
+| GPP [g] | 9 | +1 | 2 | 0.3 | 12 | +4 | 5 | 0.6 | in |
+
+### US-Prr, west
+
+|  | measured | months: bias | RMSE | r | n | days: bias | RMSE | r | verdict |
+| --- | ---: | --- | --- | --- | --- | --- | --- | --- | --- |
+| GPP [g] | 9 | −7 | 8 | 0.9 | 12 | +4 | 5 | 0.6 | **MISS** |
+
+## 9. What misses
+
+| where | what | likely |
+| --- | --- | --- |
+| US-Prr | GPP | light use |
+"""
+    assert excerpts.scores(page, "SE-Svb") == {"GPP [g]": ["+1", "2", "0.3", "in"]}
+    assert excerpts.scores(page, "US-Prr") == {"GPP [g]": ["−7", "8", "0.9", "**MISS**"]}
+    assert excerpts.misses(page) == 1
+
+
+def missing(what):
+    """Medians and limits of values that the list at the end of docs/validation.md has."""
+    number = r"(-?[\d.]+)"
+    listed = re.escape(what) + rf"[^|]*?: median {number}, observed {number} .. {number}"
+    return [tuple(map(float, found)) for found in re.findall(listed, VALIDATION.split("What misses\n")[1])]
+
+
+def test_the_readmes_words_on_what_misses_are_so():
+    clear_cut = missing("ground heat, May to August")
+    assert clear_cut and all(median <= 0.34 * (low * high) ** 0.5 for median, low, high in clear_cut)  # the limits are
+    # half and twice the measured
+    ((thaw, _, _),) = missing("depth of thaw [m]")
+    assert 1.9 < thaw / 0.52 and thaw / 0.36 < 3.1  # measured: .36-.52, in that page's part 7
+    assert re.findall(r"\| even-aged deciduous \| biomass at (\d+) years", VALIDATION) == ["30", "75"]
+    assert all(median < low for median, low, _ in missing("biomass at 30 years") + missing("biomass at 75 years"))

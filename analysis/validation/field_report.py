@@ -52,7 +52,7 @@ over sites (10-90 %). Stands are held as in part 1, without fire and insects.
 
 Larch near Yakutsk, leaf area about 2.5, felled after {clear_cut.YEARS_BEFORE} years: what the cutover has more than the
 forest on the same site and in the same weather, in the years after. The organic layer stays that of the forest. Wind is
-{number(JUDGED_WIND, 0)} m/s where judged, which is within a factor of {number(FACTOR, 0)} of the measured.
+{number(JUDGED_WIND, 0)} m/s where judged; the band is the measured within a factor of {number(FACTOR, 0)}.
 
 {document.table(header, cut_rows, left=6)}
 

@@ -41,8 +41,8 @@ LIKELY = {
         "GPP": "light use of Nordic forests, on cold and poor ground; deciduous shrubs have no phenology",
         "ecosystem respiration": "one soil pool; the understorey respires as it photosynthesises, not in winter",
         "net exchange": "shrubs and moss have no phenology; soil carbon is assumed",
-        "latent heat": "the ground evaporates too much in the weeks after melt (April to June): as wet ground at the "
-        "warm skin's rate, where moss lies over ice that takes up the heat; the tower's open balance",
+        "latent heat": "the ground evaporates too much, most in the weeks after melt (April to June): its moss stays "
+        "wet, since the soil below gives it water; the tower's open balance",
         "sensible heat": "too little heat goes into the ground in summer, so more goes to the air",
         "net radiation": "snow's albedo, and the temperature of the ground's surface",
         "soil temperature": "one store of water in the organic layer: its moss does not dry by itself; snow too thin",

@@ -10,7 +10,7 @@ import numpy as np
 from sim.demography import AGE_CLASSES
 from sim.jit import uncompiled
 from sim.management import CONIFER_MIXES, DENSITY_CHANGES, NEGLIGIBLE_STEMS, feasible_change
-from sim.task.checks import check_choice
+from sim.parameters import check_name
 from sim.task.observation import AGE_ENTRIES, SPECIES_AND_AGES, Reader, observation_rows
 
 MAY_BE_CUT = AGE_CLASSES[AGE_CLASSES.index("young") :]
@@ -48,7 +48,7 @@ class MaskFunction:
     """
 
     def __init__(self, names: Sequence[str], youngest: str):
-        check_choice("harvest_min_class", youngest, MAY_BE_CUT)
+        check_name("harvest_min_class", youngest, MAY_BE_CUT)
         self.width = len(names)
         self.read = Reader(NEEDED, names)
         old_enough = AGE_CLASSES[AGE_CLASSES.index(youngest) :]

@@ -8,10 +8,9 @@ from gymnasium.spaces import Box
 
 import sim
 from sim.management import check_actions
-from sim.parameters import check_seed
+from sim.parameters import check_name, check_seed
 from sim.spin_up import BOUNDARY, check_initial_ranges, middle_stocks
 from sim.task.actions import MaskFunction, mask_function, unchanged
-from sim.task.checks import check_choice
 from sim.task.objectives import (
     HISTORY_NAMES,
     PAPER_OBJECTIVES,
@@ -62,8 +61,8 @@ class Episodes:
         observation_groups=None,
         record_years=False,
     ):
-        check_choice("mode", mode, MODES)
-        check_choice("thaw_formulation", thaw_formulation, THAW_FORMULATIONS)
+        check_name("mode", mode, MODES)
+        check_name("thaw_formulation", thaw_formulation, THAW_FORMULATIONS)
         if isinstance(years, bool) or not isinstance(years, (int, np.integer)) or not 1 <= years <= 1000:
             raise ValueError(f"years: an integer in [1, 1000] is allowed, got {years!r}")
         if site_seed is not None:
@@ -272,7 +271,7 @@ def check_groups(wanted, groups: Sequence[str]) -> tuple[str, ...]:
         raise ValueError(f"observation_groups: a sequence of names is allowed, got {wanted!r}")
     wanted = tuple(wanted)
     for group in wanted:
-        check_choice("observation group", group, tuple(dict.fromkeys(("preference", *groups))))
+        check_name("observation group", group, tuple(dict.fromkeys(("preference", *groups))))
     if len(set(wanted)) < len(wanted):
         raise ValueError(f"observation_groups {', '.join(wanted)}: each is allowed once")
     return wanted

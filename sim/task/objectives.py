@@ -8,7 +8,7 @@ import numpy as np
 
 import sim
 from sim.management import decode, missed_share
-from sim.task.checks import check_choice
+from sim.parameters import check_name
 
 THAW_FORMULATIONS = ("asymmetric", "contrast", "raw_degree_days")
 COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
@@ -234,7 +234,7 @@ def check_objectives(objectives: Sequence) -> tuple:
         raise ValueError(f"objectives: a sequence of {', '.join(allowed)} and Objective, got {objectives!r}")
     for objective in objectives:
         if not isinstance(objective, Objective):
-            check_choice("objective", objective, allowed)
+            check_name("objective", objective, allowed)
     objectives = [FIELD_OBJECTIVES.get(o, o) if isinstance(o, str) else o for o in objectives]
     names = objective_names(objectives)
     if len(set(names)) < len(names):

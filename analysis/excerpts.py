@@ -1,0 +1,92 @@
+"""What README.md and docs/performance.md show of results/benchmark.csv and of docs/validation.md, as Markdown."""
+
+import re
+from pathlib import Path
+
+import pandas as pd
+
+from analysis import paths
+from cleanrl_style import protocol
+
+VALIDATION = Path("docs/validation.md")
+TOWERS = ("SE-Svb", "US-Prr")
+SCORES = ("months: bias", "RMSE", "r", "verdict")  # of a tower's table, in this order; those of months come first
+
+#: Row of benchmark.csv -> what the README calls it.
+SPEEDS = {
+    "50-year episode, 1 stand": "50-year episode, one stand, one core",
+    "50-year episode, 16 stands in lockstep, each": "the same in lockstep (16 stands), per stand and core",
+    "lockstep, 300,000 steps with evaluation": "300,000 steps with evaluation, 32 stands in lockstep on all cores",
+    "async, 300,000 steps with evaluation": "the same, 8 stands in worker processes",
+    "first start, 16 stands": "first start, the physics compiled",
+    "later start, 16 stands": "later starts",
+}
+
+#: Part of a step of a training in lockstep, in benchmark.csv -> what docs/performance.md calls it.
+SHARES = {
+    "physics": "the compiled year",
+    "update": "PPO's update",
+    "plumbing": "the environment's Python, and starts of episodes",
+    "policy": "the policy in rollouts",
+}
+
+
+def figures(names) -> pd.DataFrame:
+    """Rows of results/benchmark.csv, by their names."""
+    path = paths.results() / "benchmark.csv"
+    table = pd.read_csv(path, keep_default_na=False).set_index("what")
+    missing = [name for name in names if name not in table.index]
+    if missing:
+        protocol.fail(f"{path}: no row {missing[0]!r}; python analysis/benchmark.py writes it")
+    return table.loc[list(names)]
+
+
+def markdown(header, rows) -> str:
+    """A table, a line each."""
+    return "".join(f"| {' | '.join(line)} |\n" for line in (header, ["---"] * len(header), *rows))
+
+
+def speed() -> str:
+    """Times of episodes, trainings and starts, beside the paper's."""
+    table = figures(SPEEDS)
+    repeats = " or ".join(map(str, sorted(set(table.repeats))))
+    rows = []
+    for row in table.itertuples():
+        middle, low, high = (f"{time:#.2g}".rstrip(".") for time in (row.median, row.low, row.high))
+        spread = f" ({low}-{high})" if low != high else ""
+        rows.append([SPEEDS[row.Index], f"{middle} {row.unit}{spread}", row.paper])
+    return markdown(["speed", f"here: median of {repeats} (lowest-highest)", "paper"], rows)
+
+
+def shares() -> str:
+    """Where the time of a training goes."""
+    times = figures([f"lockstep, 32 stands: {part}" for part in SHARES])["median"]
+    rows = zip(SHARES.values(), 100 * times / times.sum(), strict=True)
+    return markdown(["what", "share of a lockstep training"], [[what, f"{share:.0f} %"] for what, share in rows])
+
+
+def cells(line: str) -> list[str]:
+    """Of a row of a Markdown table."""
+    return [cell.strip() for cell in line.strip("|\n").split("|")]
+
+
+def scores(page: str, tower: str) -> dict[str, list[str]]:
+    """Quantity -> its scores in a tower's table."""
+    part = page.split(f"### {tower},")[1]
+    header, _, *rows = re.search(r"\|.*months: bias.*\n(\|.*\n)+", part)[0].splitlines()
+    columns = [cells(header).index(name) for name in SCORES]
+    return {cells(row)[0]: [cells(row)[column] for column in columns] for row in rows}
+
+
+def misses(page: str) -> int:
+    """How many values the list at the page's end has."""
+    return len(re.findall(r"^\| ", page.split("What misses\n")[1], re.MULTILINE)) - 2
+
+
+def towers() -> str:
+    """Both towers by month, and how many values of the whole page miss."""
+    page = VALIDATION.read_text(encoding="utf-8")
+    first, second = (scores(page, tower) for tower in TOWERS)
+    header = ["monthly means", *(f"{tower}: {name.split()[-1]}" for tower in TOWERS for name in SCORES)]
+    table = markdown(header, [[name, *first[name], *second[name]] for name in first])
+    return f"{table}\n{misses(page)} values of that page miss, and are listed at its end.\n"
