@@ -83,7 +83,8 @@ def reward_components(record: np.ndarray, density_change: np.ndarray, reward: Re
 
     biomass, soil = column("biomass_kgc_m2"), column("soil_kgc_m2")
     change = column("net_carbon_change_kgc_m2") / reward.carbon_scale
-    stock = (biomass + soil) / reward.stock_scale
+    deadwood = column("conifer_deadwood_kgc_m2") + column("deciduous_deadwood_kgc_m2")
+    stock = (biomass + deadwood + soil) / reward.stock_scale
     products = column("hwp_stored_kgc_m2") / reward.product_scale
     gains = {
         "carbon_change": np.clip(change, -1.0, 1.0),
