@@ -38,7 +38,7 @@ def test_decay_of_a_year_by_its_days():
     decayed = columns(table, "decay").sum()
     assert decayed == pytest.approx(3.0 - sum(left), rel=1e-9)
     assert table.deadwood_respiration_kgc_m2[0] == pytest.approx(constant("deadwood_respired_share") * decayed)
-    assert decayed == pytest.approx(0.045, rel=0.4)  # a few percent a year in a boreal climate
+    assert 0.01 < decayed / 3.0 < 0.03  # a year, in a climate of so many degrees below zero
     heterotrophic = days.heterotrophic_respiration_kgc_m2
     assert heterotrophic.sum() == pytest.approx(table.heterotrophic_respiration_kgc_m2[0])
     assert (heterotrophic >= 0.8 * sum(left) * constant("deadwood_decay_conifer") * warmth).all()

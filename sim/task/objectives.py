@@ -8,7 +8,9 @@ import numpy as np
 
 import sim
 from sim.management import decode, missed_share
+from sim.task.biodiversity import biodiversity_index
 from sim.task.checks import check_choice
+from sim.task.timber import timber_reward
 
 THAW_FORMULATIONS = ("asymmetric", "contrast", "raw_degree_days")
 COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
@@ -170,9 +172,10 @@ class Objective:
     """An objective of your own, beside the paper's "carbon" and "thaw".
 
     value : function of the year's record to rewards (n,). The record is a dict of read-only columns (n,): those of
-    `HISTORY_NAMES` and of objectives before this one. For worker processes and pickling, a function at the top level
-    of a module. low, high : limits of the reward; values are clipped to them. The record gets the columns
-    `<name>_reward` and `<name>_clipped` (what was cut off), the last step's info `<name>_return`.
+    `HISTORY_NAMES`, of `TIMBER_COLUMNS` with prices, and of objectives before this one. For worker processes and
+    pickling, a function at the top level of a module. low, high : limits of the reward; values are clipped to them. The
+    record gets the columns `<name>_reward` and `<name>_clipped` (what was cut off), the last step's info
+    `<name>_return`.
     """
 
     name: str
@@ -221,22 +224,31 @@ def frozen_ground(year: dict[str, np.ndarray]) -> np.ndarray:
     return -1.0 - year["upper_ground_heat_mj_m2"] / UPPER_GROUND_HEAT_SCALE
 
 
-#: Objectives that can be asked for by name, beside the paper's: thaw as the field measures it.
+#: Thaw as the field measures it.
 FIELD_OBJECTIVES = {
     "active_layer": Objective("active_layer", shallow_thaw),
     "permafrost_heat": Objective("permafrost_heat", frozen_ground),
 }
 
+TIMBER = Objective("timber", timber_reward)
+
+#: All objectives that can be asked for by name, beside the paper's.
+READY_OBJECTIVES = {
+    **FIELD_OBJECTIVES,
+    "timber": TIMBER,
+    "biodiversity": Objective("biodiversity", biodiversity_index, low=0.0),
+}
+
 
 def check_objectives(objectives: Sequence) -> tuple:
     """Objectives of an environment, each once: names of the paper's, and `Objective`s, of which some have a name."""
-    allowed = (*PAPER_OBJECTIVES, *FIELD_OBJECTIVES)
+    allowed = (*PAPER_OBJECTIVES, *READY_OBJECTIVES)
     if isinstance(objectives, str) or not np.iterable(objectives) or not len(objectives):
         raise ValueError(f"objectives: a sequence of {', '.join(allowed)} and Objective, got {objectives!r}")
     for objective in objectives:
         if not isinstance(objective, Objective):
             check_choice("objective", objective, allowed)
-    objectives = [FIELD_OBJECTIVES.get(o, o) if isinstance(o, str) else o for o in objectives]
+    objectives = [READY_OBJECTIVES.get(o, o) if isinstance(o, str) else o for o in objectives]
     names = objective_names(objectives)
     if len(set(names)) < len(names):
         raise ValueError(f"objectives {', '.join(names)}: each is allowed once")
