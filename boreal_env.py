@@ -154,9 +154,9 @@ class BorealEnv(Described, gym.Env, EzPickle):
     less penalties. Thaw: heat out of the permafrost boundary, less 2.5 times heat into it, over 40 MJ/m2. Ready beside
     them is thaw as the field measures it: "active_layer", 1 - thaw depth / 1 m, and "permafrost_heat",
     -1 - heat of the upper 3 m / 135 MJ/m2 (1 is frozen through, -1 thawed); "timber", the year's net revenue at the
-    prices of `timber`, discounted, over 4000 EUR/ha, so that the return is the net present value over that; and
-    "biodiversity", an index in [0, 1] of species and ages, old trees, dead wood and open ground. Any other objective is
-    a function of the year's record: `objectives=("carbon", "active_layer", Objective("harvest", value, 0, 1))`.
+    prices of `timber`, discounted, over 3000 EUR/ha, so that the return is the net present value over that; and
+    "biodiversity", a quarter of an index in [0, 1] of species and ages, old trees, dead wood and open ground. Any other
+    objective is a function of the year's record: `objectives=("carbon", "thaw", Objective("harvest", value, 0, 1))`.
     The preference has a weight for each, none negative, 1 in sum; of two it is given as one number, the first's.
 
     ## Starting State

@@ -6,6 +6,8 @@ from sim.carbon import q10_factor
 from sim.jit import compiled, phase
 from sim.physical_constants import DAYS_PER_YEAR
 
+MOST_DEADWOOD = 60.0  # kgC m-2 of a species, that a stand may start with
+
 
 @compiled
 def wood_of_dead(carbon, burned, stem_share) -> float:
@@ -63,8 +65,10 @@ def burn_deadwood(b, i) -> float:
 
 
 def deadwood_in_balance(deadwood, wood_died, decayed) -> np.ndarray:
-    """Dead wood that decays as fast as wood dies: stems die at a year's end, and decay is in proportion to the stock.
+    """Dead wood that decays as fast as wood dies, up to `MOST_DEADWOOD`: stems die at a year's end, and decay is in
+    proportion to the stock.
 
     deadwood : at the start of the year just run; wood_died, decayed : in that year; all of one shape.
     """
-    return np.where(decayed > 0.0, wood_died * deadwood / np.where(decayed > 0.0, decayed, 1.0), 0.0)
+    balanced = wood_died * deadwood / np.where(decayed > 0.0, decayed, 1.0)
+    return np.where(decayed > 0.0, np.minimum(balanced, MOST_DEADWOOD), 0.0)

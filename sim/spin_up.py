@@ -10,6 +10,7 @@ from statistics import NormalDist
 import numpy as np
 
 from sim import organic, soil
+from sim.deadwood import MOST_DEADWOOD
 from sim.demography import AGE_CLASSES, AGES, OLDEST, first_ages, stem_weight
 from sim.jit import uncompiled
 from sim.parameters import SITE_PARAMETERS, check_mapping
@@ -59,7 +60,7 @@ INITIAL_LIMITS = {
     "biomass_kgc_m2": (0.0, 60.0),
     "soil_kgc_m2": (0.0, 100.0),
     "oldest_age_years": (1.0, 200.0),
-    **{f"{name}_kgc_m2": (0.0, 60.0) for name in DEADWOOD},
+    **{f"{name}_kgc_m2": (0.0, MOST_DEADWOOD) for name in DEADWOOD},
     "hwp_kgc_m2": (0.0, 60.0),
     "organic_layer_m": (0.0, 2.0),
     **dict.fromkeys(CLASS_NAMES, (0.0, 10000.0)),

@@ -68,6 +68,6 @@ def test_it_stays_in_its_bounds(stems, wood, cover):
 def test_it_is_an_objective_by_name():
     env = quick(objectives=("carbon", "biodiversity"), record_years=True)
     _, rewards, info = play(env, [2, 12, 22, 4], seed=2)
-    np.testing.assert_allclose(rewards[:, 1], biodiversity_index(info["years"]), rtol=1e-6)
+    np.testing.assert_allclose(4.0 * rewards[:, 1], biodiversity_index(info["years"]), rtol=1e-6)
     assert (info["years"]["biodiversity_clipped"] == 0.0).all() and 0.0 < rewards[:, 1].min()
     assert env.reward_space.low.tolist() == [-1.0, 0.0]

@@ -49,6 +49,15 @@ def open_ground(year: dict[str, np.ndarray]) -> np.ndarray:
     return np.interp(1.0 - year["crown_cover"], [0.0, *GAPS, NO_FOREST], [0.0, 1.0, 1.0, 0.0])
 
 
+#: What "biodiversity" counts the index in: its return then varies between plans as those of carbon and thaw do.
+BIODIVERSITY_SCALE = 4.0
+
+
+def biodiversity_reward(year: dict[str, np.ndarray]) -> np.ndarray:
+    """The year's index over `BIODIVERSITY_SCALE`."""
+    return biodiversity_index(year) / BIODIVERSITY_SCALE
+
+
 def biodiversity_index(year: dict[str, np.ndarray]) -> np.ndarray:
     """Mean of the four features."""
     return np.clip(0.25 * (structure(year) + old_trees(year) + deadwood(year) + open_ground(year)), 0.0, 1.0)

@@ -8,7 +8,7 @@ import numpy as np
 
 import sim
 from sim.management import decode, missed_share
-from sim.task.biodiversity import biodiversity_index
+from sim.task.biodiversity import biodiversity_reward
 from sim.task.checks import check_choice
 from sim.task.timber import timber_reward
 
@@ -236,7 +236,7 @@ TIMBER = Objective("timber", timber_reward)
 READY_OBJECTIVES = {
     **FIELD_OBJECTIVES,
     "timber": TIMBER,
-    "biodiversity": Objective("biodiversity", biodiversity_index, low=0.0),
+    "biodiversity": Objective("biodiversity", biodiversity_reward, low=0.0),
 }
 
 
