@@ -161,7 +161,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
 
     ## Starting State
     Site, first stocks and ages, weather and preference are drawn anew in generalist mode, and are fixed in
-    site-specific mode (but the preference). Soil, snow and water are spun up.
+    site-specific mode (but the preference). Soil, snow and water are spun up; dead wood is what deaths keep up.
 
     ## Which Id
     `boreal-balanced-v0` is the task to study policies with: the ground below is in balance with the climate and the
