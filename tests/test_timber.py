@@ -3,6 +3,7 @@
 import csv
 import math
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from playing import QUICK, play, quick
@@ -167,6 +168,25 @@ def test_prices_add_columns_and_leave_the_rest_as_it_is():
         "discounted_revenue_eur_ha",
     }
     assert set(with_prices) - set(without) == {"net_present_value_eur_ha"}
+
+
+@pytest.mark.parametrize(
+    "env_id, more", [("boreal-timber-v0", ("timber",)), ("boreal-four-v0", ("timber", "biodiversity"))]
+)
+def test_the_ids_are_the_balanced_task_with_more_objectives(env_id, more):
+    env = gym.make(env_id, **QUICK).unwrapped
+    assert env.objective_names == ("carbon", "thaw", *more)
+    balanced = gym.make("boreal-balanced-v0", **QUICK).unwrapped
+    assert env.observation_space.shape == (105 + len(more),) and balanced.observation_space.shape == (105,)
+    assert set(balanced.observation_names[1:]) < set(env.observation_names)
+    weights = np.full(2 + len(more), 1.0 / (2 + len(more)))
+    _, rewards, info = play(env, [2, 12, 22, 4], seed=4, options={"preference": weights})
+    _, two, _ = play(balanced, [2, 12, 22, 4], seed=4, options={"preference": 0.5})
+    assert rewards.shape == (4, 2 + len(more)) and (np.abs(rewards) <= 1.0).all()
+    assert np.isfinite(info["net_present_value_eur_ha"]) and rewards[0, 2] > 0.0 > rewards[2, 2]
+    np.testing.assert_array_equal(rewards[:, :2], two)
+    together = env.lockstep(2)
+    assert together.reset(seed=1)[0].shape == (2, 105 + len(more)) and together.reward_dim == 2 + len(more)
 
 
 def test_a_planted_seedling_costs_its_price():
