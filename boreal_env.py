@@ -33,6 +33,7 @@ from sim.task.objectives import (
     FIELD_OBJECTIVES,
     HISTORY_NAMES,
     PAPER_OBJECTIVES,
+    READY_OBJECTIVES,
     REWARD_COLUMNS,
     THAW_FORMULATIONS,
     Objective,
@@ -70,6 +71,7 @@ __all__ = [
     "Objective",
     "Observed",
     "PAPER_OBJECTIVES",
+    "READY_OBJECTIVES",
     "REWARD_COLUMNS",
     "Reward",
     "THAW_FORMULATIONS",
@@ -147,24 +149,27 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `density_limit` after the action costs it whatever the action, valid or not.
 
     ## Reward Space
-    `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, soil and wood products over `carbon_scale`,
+    `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, dead wood, soil and products over `carbon_scale`,
     less penalties. Thaw: a year's heat up through a boundary of fixed temperature, 12 m deep, less 2.5 times the heat
     down through it, over 40 MJ/m2. Ready beside them is thaw as the field measures it: "active_layer", 1 - thaw depth /
-    1 m, and "permafrost_heat", -1 - heat of the upper 3 m / 135 MJ/m2 (1 is frozen at -2 degC, -1 thawed at 0 degC).
-    Any other objective is a function of the year's record:
-    `objectives=("carbon", "active_layer", Objective("timber", value, 0, 1))`.
+    1 m, and "permafrost_heat", -1 - heat of the upper 3 m / 135 MJ/m2 (1 is frozen at -2 degC, -1 thawed at 0 degC);
+    "timber", the year's net revenue at the prices of `timber`, discounted, over 3000 EUR/ha, so that the return is the
+    net present value over that; and "biodiversity", a quarter of an index in [0, 1] of species and ages, old trees,
+    dead wood and open ground. Any other objective is a function of the year's record: `objectives=("carbon", "thaw",
+    Objective("harvest", value, 0, 1))`.
     The preference has a weight for each, none negative, 1 in sum; of two it is given as one number, the first's.
 
     ## Starting State
     Site, first stocks and ages, weather and preference are drawn anew in generalist mode, and are fixed in
-    site-specific mode (but the preference). Soil, snow and water are spun up.
+    site-specific mode (but the preference). Soil, snow and water are spun up; dead wood is what deaths keep up.
 
     ## Which Id
     `boreal-balanced-v0` is the task to study policies with: the ground below is in balance with the climate and the
     first stand above it, the soil's carbon with its litter, weather varies from day to day as on record, and both
     returns vary equally between policies. `boreal-generalist-v0` and `boreal-site-specific-v0` are the paper's: use
     them to compare with it. There the boundary's temperature is drawn without regard to the climate, and so which
-    site was drawn decides nearly all of the thaw return.
+    site was drawn decides nearly all of the thaw return. `boreal-timber-v0` is the balanced task with a third
+    objective, timber at Finnish prices, `boreal-four-v0` with biodiversity as a fourth.
 
     ## Episode Termination
     After 50 years the episode is terminated: nothing is worth anything beyond.
@@ -192,8 +197,12 @@ class BorealEnv(Described, gym.Env, EzPickle):
       keeps up, at least 2 kgC/m2; as drawn without trees
     - `weather`: "paper", or "observed" (`boreal-balanced-v0`): temperature, wet days and wind vary from day to day as
       on record, and means stay
-    - `objectives`: of the reward vector, "carbon", "thaw", "active_layer", "permafrost_heat" and any `Objective` of
-      your own
+    - `objectives`: of the reward vector, "carbon", "thaw", "active_layer", "permafrost_heat", "timber", "biodiversity"
+      and any `Objective` of your own
+    - `timber`: prices and costs, which "timber" needs: "finland", "sweden" or "canada" of `sim/timber_prices.csv`, a
+      .csv with the same columns, or a dict of all its items in EUR; the record then has the revenue, the last step's
+      info the net present value
+    - `discount_rate`: of that, a year's (0.03)
     - `mechanisms`: switches of the physics, see `sim.MECHANISMS`
     - `constants`: literature constants to override, see `sim/constants.csv`
     - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`, whose order they keep
@@ -421,6 +430,20 @@ REGISTERED: dict[str, dict] = {
     "boreal-generalist-v0": {"mode": "generalist"},
     "boreal-site-specific-v0": {"mode": "site_specific"},
     "boreal-balanced-v0": {"mode": "generalist", "balanced": True, **BALANCED_WORLD},
+    "boreal-timber-v0": {
+        "mode": "generalist",
+        "balanced": True,
+        **BALANCED_WORLD,
+        "objectives": ("carbon", "thaw", "timber"),
+        "timber": "finland",
+    },
+    "boreal-four-v0": {
+        "mode": "generalist",
+        "balanced": True,
+        **BALANCED_WORLD,
+        "objectives": ("carbon", "thaw", "timber", "biodiversity"),
+        "timber": "finland",
+    },
 }
 for _name, _kwargs in REGISTERED.items():
     gym.register(

@@ -37,6 +37,7 @@ FINAL_INFO = {
     "growing_season_days": ("day yr-1", "days with a mean above 5 degC, mean of the years"),
     "latent_heat_mj_m2": ("MJ m-2 yr-1", "latent heat to the air, mean of the years"),
     "ground_shortwave_mj_m2": ("MJ m-2 yr-1", "shortwave absorbed by ground and snow, mean of the years"),
+    "net_present_value_eur_ha": ("EUR ha-1", "with prices (`timber`): sum of the discounted net revenues"),
     "years": (
         "",
         "with `record_years`: dict of `year` (from 1) and the columns `boreal_env.HISTORY_NAMES`, each with "

@@ -21,6 +21,7 @@ from analysis.figures import (
     learning_asymmetry,
     learning_curves,
     learning_difficulty,
+    many_objectives,
     performance_panel,
     site_influence,
     strategies,
@@ -85,9 +86,16 @@ def main(args: Args) -> None:
         for module in FIGURES:
             with matplotlib.rc_context(STYLE):
                 save(draw(module, results), folder / name_of(module))
+        others = many_objectives.figures(results)
+        for name, (size, drawing) in others.items():
+            with matplotlib.rc_context(STYLE):
+                figure = Figure(figsize=size, layout="constrained")
+                drawing(figure)
+                figure.supxlabel(textwrap.fill(many_objectives.CAPTION, int(18 * size[0])), fontsize=6)
+                save(figure, folder / name)
     except OSError as error:
         sys.exit(f"error: --figures-dir {folder}: cannot write there ({error.strerror})")
-    print(f"{len(FIGURES)} figures: {folder}/*.png, *.pdf")
+    print(f"{len(FIGURES) + len(others)} figures: {folder}/*.png, *.pdf")
 
 
 if __name__ == "__main__":

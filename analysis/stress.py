@@ -74,6 +74,8 @@ CLASSES_TO_CUT = ("young", "mature", "old")
 CARBON_STORES = {
     "biomass_kgc_m2": ("conifer_biomass", "deciduous_biomass"),
     "soil_kgc_m2": ("soil_carbon",),
+    "conifer_deadwood_kgc_m2": ("conifer_deadwood",),
+    "deciduous_deadwood_kgc_m2": ("deciduous_deadwood",),
     "hwp_kgc_m2": ("products",),
 }
 
@@ -83,6 +85,8 @@ YEARLY_BUDGETS = {
     "carbon_of_the_year_kgc_m2": 1e-9,
     "biomass_of_the_year_kgc_m2": 1e-9,
     "soil_of_the_year_kgc_m2": 1e-9,
+    "conifer_deadwood_of_the_year_kgc_m2": 1e-9,
+    "deciduous_deadwood_of_the_year_kgc_m2": 1e-9,
     "hwp_of_the_year_kgc_m2": 1e-9,
     "water_of_the_year_mm": 1e-9,
     "deep_heat_of_the_year_mj_m2": 1e-9,
@@ -219,7 +223,7 @@ def budgets(before: np.ndarray, after: np.ndarray, record: dict) -> Iterator[tup
         return (after[:, columns] - before[:, columns]).sum(axis=1), stock
 
     r = record
-    carbon, stock = change("conifer_biomass", "deciduous_biomass", "soil_carbon", "products")
+    carbon, stock = change(*(store for stores in CARBON_STORES.values() for store in stores))
     crossed = (
         r["gpp_kgc_m2"]
         - r["autotrophic_respiration_kgc_m2"]
@@ -260,6 +264,8 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         "conifer_biomass",
         "deciduous_biomass",
         "soil_carbon",
+        "conifer_deadwood",
+        "deciduous_deadwood",
         "products",
         "organic_depth",
         "swe",
@@ -291,6 +297,8 @@ def ranges(group: Group, parameters: dict, state: dict, stems: np.ndarray, recor
         "understorey_litter_kgc_m2",
         "mortality_kgc_m2",
         "fire_mortality_kgc_m2",
+        "dead_litter_kgc_m2",
+        "deadwood_respiration_kgc_m2",
         "fire_loss_kgc_m2",
         "burned_trees_kgc_m2",
         "burned_soil_kgc_m2",

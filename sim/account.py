@@ -19,6 +19,7 @@ def clear_year(b, i):
     s, w = b.s, b.w
     w.biomass_before[i] = s.conifer_biomass[i] + s.deciduous_biomass[i]
     w.soil_before[i] = s.soil_carbon[i]
+    w.deadwood_before[i] = s.conifer_deadwood[i] + s.deciduous_deadwood[i]
     w.products_before[i] = s.products[i]
     conifers, deciduous = count_stand(b, i)
     w.stems_before[i] = conifers + deciduous
@@ -225,11 +226,14 @@ def write_record(b, i):
 
     r.biomass_kgc_m2[i] = s.conifer_biomass[i] + s.deciduous_biomass[i]
     r.soil_kgc_m2[i] = s.soil_carbon[i]
+    r.conifer_deadwood_kgc_m2[i] = s.conifer_deadwood[i]
+    r.deciduous_deadwood_kgc_m2[i] = s.deciduous_deadwood[i]
     r.hwp_kgc_m2[i] = s.products[i]
     r.biomass_change_kgc_m2[i] = r.biomass_kgc_m2[i] - w.biomass_before[i]
     r.soil_change_kgc_m2[i] = r.soil_kgc_m2[i] - w.soil_before[i]
-    products_change = s.products[i] - w.products_before[i]
-    r.net_carbon_change_kgc_m2[i] = r.biomass_change_kgc_m2[i] + r.soil_change_kgc_m2[i] + products_change
+    deadwood_change = s.conifer_deadwood[i] + s.deciduous_deadwood[i] - w.deadwood_before[i]
+    kept = deadwood_change + s.products[i] - w.products_before[i]
+    r.net_carbon_change_kgc_m2[i] = r.biomass_change_kgc_m2[i] + r.soil_change_kgc_m2[i] + kept
     crossed = (
         r.gpp_kgc_m2[i]
         - r.autotrophic_respiration_kgc_m2[i]
@@ -243,4 +247,5 @@ def write_record(b, i):
     r.summer_albedo[i] = w.summer_up[i] / w.summer_down[i] if w.summer_down[i] > 0.0 else math.nan
     r.winter_albedo[i] = w.winter_up[i] / w.winter_down[i] if w.winter_down[i] > 0.0 else math.nan
     r.organic_layer_m[i] = s.organic_depth[i]
+    r.crown_cover[i] = w.cover_conifer[i] + w.cover_deciduous[i]
     note_thaw(b, i)

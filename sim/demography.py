@@ -3,6 +3,7 @@
 Stems are real numbers per hectare in arrays (AGES, lanes); the last row pools all beyond 100 years.
 """
 
+from sim.deadwood import lay_down
 from sim.jit import compiled, phase, uncompiled
 from sim.mathematics import between, exponential
 from sim.physical_constants import SQUARE_METRES_PER_HECTARE
@@ -108,24 +109,24 @@ def fell(b, i, conifers, deciduous):
 
 @phase
 def kill(b, i, conifers, deciduous):
-    """Let shares of a lane's conifers and deciduous trees, of all ages alike, die; their carbon goes to the soil.
+    """Let shares of a lane's conifers and deciduous trees, of all ages alike, die; they are laid down.
 
     Returns the stems that died [ha-1], which are booked.
     """
     living_conifers, living_deciduous = count_stand(b, i)
     killed = conifers * living_conifers + deciduous * living_deciduous
     dead_conifers, dead_deciduous = fell(b, i, conifers, deciduous)
-    bury(b, i, killed, dead_conifers + dead_deciduous)
+    bury(b, i, killed, dead_conifers, dead_deciduous)
     return killed
 
 
 @compiled
-def bury(b, i, stems, carbon):
-    """Book dead stems [ha-1], and give their carbon [kgC m-2] to the soil."""
-    b.s.soil_carbon[i] += carbon
+def bury(b, i, stems, conifer, deciduous):
+    """Book dead stems [ha-1], and give their species' carbon [kgC m-2] to dead wood and soil."""
+    lay_down(b, i, conifer, deciduous, 0.0, 0.0)
     b.w.stems_gain[i] -= stems
     b.r.dead_stems_ha[i] += stems
-    b.r.mortality_kgc_m2[i] += carbon
+    b.r.mortality_kgc_m2[i] += conifer + deciduous
 
 
 @compiled
@@ -171,17 +172,17 @@ def background_deaths(stems, sizes, lane, rate, suppressed, reference) -> float:
 
 @phase
 def kill_small(b, i, conifers, deciduous):
-    """Let so many of a lane's stems of each species die [ha-1], small ones first; their carbon goes to the soil."""
+    """Let so many of a lane's stems of each species die [ha-1], small ones first; they are laid down."""
     s, p, w = b.s, b.p, b.w
     suppressed = p.suppressed_stem_size[i]
     died, lost = weaken(s.conifer_stems, w.conifer_size, i, conifers, suppressed)
     carbon = lost * s.conifer_biomass[i]
     s.conifer_biomass[i] -= carbon
-    bury(b, i, died, carbon)
+    bury(b, i, died, carbon, 0.0)
     died, lost = weaken(s.deciduous_stems, w.deciduous_size, i, deciduous, suppressed)
     carbon = lost * s.deciduous_biomass[i]
     s.deciduous_biomass[i] -= carbon
-    bury(b, i, died, carbon)
+    bury(b, i, died, 0.0, carbon)
 
 
 @compiled

@@ -1,5 +1,6 @@
 """Fire and insects: their hazards, and what they do to a stand. Their dice are drawn before the year begins."""
 
+from sim.deadwood import burn_deadwood, lay_down
 from sim.demography import count_stand, fell, kill
 from sim.jit import compiled, phase
 from sim.mathematics import between
@@ -75,29 +76,33 @@ def ignites(b, day, i) -> bool:
 
 @phase
 def burn(b, i):
-    """A fire: trees and organic layer burn in part, and what does not burn goes to the soil."""
+    """A fire: trees, dead wood and organic layer burn in part; what is left of the trees is laid down."""
     s, p, w, r, d = b.s, b.p, b.w, b.r, b.d
     killed = between(p.fire_kill_low[i], p.fire_kill_high[i], d.fire_kill[i])
     conifers, deciduous = count_stand(b, i)
     w.stems_gain[i] -= killed * (conifers + deciduous)
     conifer, deciduous = fell(b, i, killed, killed)
-    burned = p.fire_combusted_conifer[i] * conifer + p.fire_combusted_deciduous[i] * deciduous
+    burned_conifer = p.fire_combusted_conifer[i] * conifer
+    burned_deciduous = p.fire_combusted_deciduous[i] * deciduous
+    burned = burned_conifer + burned_deciduous
+    wood = burn_deadwood(b, i)
     share = between(p.fire_organic_low[i], p.fire_organic_high[i], d.fire_depth[i])
     depth = share * s.organic_depth[i]
     soil = min(depth * p.organic_carbon_density[i], share * s.soil_carbon[i])
     s.organic_depth[i] -= depth
-    s.soil_carbon[i] += conifer + deciduous - burned - soil
+    s.soil_carbon[i] -= soil
+    lay_down(b, i, conifer, deciduous, burned_conifer, burned_deciduous)
     r.fire_mortality[i] = killed
     r.fire_mortality_kgc_m2[i] += conifer + deciduous - burned
     r.burned_trees_kgc_m2[i] += burned
     r.burned_soil_kgc_m2[i] += soil
-    r.fire_loss_kgc_m2[i] += burned + soil
+    r.fire_loss_kgc_m2[i] += burned + wood + soil
     crown_areas(b, i)
 
 
 @phase
 def insects(b, i):
-    """An outbreak, if dice, the past winter and density agree; the dead go to the soil."""
+    """An outbreak, if dice, the past winter and density agree; the dead are laid down."""
     p, w, r, d = b.p, b.w, b.r, b.d
     conifers, deciduous = count_stand(b, i)
     density = conifers + deciduous

@@ -7,6 +7,7 @@ the share that it leaves undone, `missed_share` (`sim.task.objectives`).
 
 import numpy as np
 
+from sim.assortment import standing_wood
 from sim.demography import (
     AGE_CLASSES,
     OLDEST,
@@ -19,6 +20,7 @@ from sim.demography import (
     total_weight,
 )
 from sim.jit import compiled, phase
+from sim.physical_constants import SQUARE_METRES_PER_HECTARE
 
 DENSITY_CHANGES = (-100.0, -50.0, 0.0, 50.0, 100.0)  # stems ha-1
 CONIFER_MIXES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -143,6 +145,9 @@ def plant(b, i, stems):
 def thin(b, i, conifers, deciduous):
     """Cut so many stems of each species [ha-1]; a part of their carbon is stored in products, the rest lost."""
     s, p, w, r = b.s, b.p, b.w, b.r
+    unit_conifer = tree_unit(s.conifer_stems, w.conifer_size, i, s.conifer_biomass[i])
+    unit_deciduous = tree_unit(s.deciduous_stems, w.deciduous_size, i, s.deciduous_biomass[i])
+    before_conifer, before_deciduous = stand_wood(b, i, unit_conifer, unit_deciduous)
     first_age = int(w.first_cut_age[i])
     ages = class_ages(int(p.young_age_limit[i]), int(p.mature_age_limit[i]))
     exponent = p.stem_carbon_exponent[i]
@@ -159,6 +164,13 @@ def thin(b, i, conifers, deciduous):
         p.height_shape_deciduous[i],
         exponent,
     )
+    after_conifer, after_deciduous = stand_wood(b, i, unit_conifer, unit_deciduous)
+    r.conifer_sawlog_kgc_m2[i] = max(before_conifer[0] - after_conifer[0], 0.0)
+    r.conifer_pulpwood_kgc_m2[i] = max(before_conifer[1] - after_conifer[1], 0.0)
+    r.conifer_energy_wood_kgc_m2[i] = max(before_conifer[2] - after_conifer[2], 0.0)
+    r.deciduous_sawlog_kgc_m2[i] = max(before_deciduous[0] - after_deciduous[0], 0.0)
+    r.deciduous_pulpwood_kgc_m2[i] = max(before_deciduous[1] - after_deciduous[1], 0.0)
+    r.deciduous_energy_wood_kgc_m2[i] = max(before_deciduous[2] - after_deciduous[2], 0.0)
     harvest = share_conifer * s.conifer_biomass[i] + share_deciduous * s.deciduous_biomass[i]
     s.conifer_biomass[i] -= share_conifer * s.conifer_biomass[i]
     s.deciduous_biomass[i] -= share_deciduous * s.deciduous_biomass[i]
@@ -170,10 +182,49 @@ def thin(b, i, conifers, deciduous):
 
 
 @compiled
+def tree_unit(stems, sizes, lane, biomass) -> float:
+    """Carbon of a tree of relative size 1 [kgC], of a species whose trees have so much biomass [kgC m-2]."""
+    whole = 0.0
+    for age in range(OLDEST + 1):
+        whole += stems[age, lane] * sizes[age, lane]
+    return SQUARE_METRES_PER_HECTARE * biomass / whole if whole > 0.0 else 0.0
+
+
+@phase
+def stand_wood(b, i, unit_conifer, unit_deciduous):
+    """Sawlogs, pulpwood and energy wood of each species that stand now [kgC m-2]; unit_* : see `standing_wood`."""
+    s, p, w = b.s, b.p, b.w
+    diameter, exponent = p.stem_diameter_cm[i], p.stem_carbon_exponent[i]
+    conifer = standing_wood(
+        s.conifer_stems,
+        w.conifer_size,
+        i,
+        unit_conifer,
+        p.stem_share_conifer[i],
+        diameter,
+        exponent,
+        p.sawlog_top_conifer_cm[i],
+        p.pulpwood_top_cm[i],
+    )
+    deciduous = standing_wood(
+        s.deciduous_stems,
+        w.deciduous_size,
+        i,
+        unit_deciduous,
+        p.stem_share_deciduous[i],
+        diameter,
+        exponent,
+        p.sawlog_top_deciduous_cm[i],
+        p.pulpwood_top_cm[i],
+    )
+    return conifer, deciduous
+
+
+@compiled
 def bury_last(b, i):
-    """Without stems nothing lives: what biomass there was is dead wood."""
+    """Without stems nothing lives: what biomass there was is laid down."""
     s = b.s
-    dead = s.conifer_biomass[i] + s.deciduous_biomass[i]
+    conifer, deciduous = s.conifer_biomass[i], s.deciduous_biomass[i]
     s.conifer_biomass[i] = 0.0
     s.deciduous_biomass[i] = 0.0
-    bury(b, i, 0.0, dead)
+    bury(b, i, 0.0, conifer, deciduous)

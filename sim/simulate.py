@@ -54,9 +54,10 @@ def simulate(
         water], wind_speed_m_s, shortwave_w_m2, longwave_w_m2 [W m-2], precipitation_mm [mm per interval]. Whole
         years of 365 days (29 February is dropped), repeated if there are fewer than `years`; or, with years=1,
         whole days of a part of a year that starts on 1 January. Intervals finer than the time step are averaged.
-    initial : first stocks by name: density_stems_ha, conifer_fraction, biomass_kgc_m2, soil_kgc_m2, hwp_kgc_m2,
-        organic_layer_m, oldest_age_years, or stems by class (conifer_mature_stems_ha, ...); the rest is drawn, but for
-        the stems' age, which follows from biomass and density if it is not given.
+    initial : first stocks by name: density_stems_ha, conifer_fraction, biomass_kgc_m2, soil_kgc_m2,
+        conifer_deadwood_kgc_m2, deciduous_deadwood_kgc_m2, hwp_kgc_m2, organic_layer_m, oldest_age_years, or stems by
+        class (conifer_mature_stems_ha, ...); the rest is drawn, but for the stems' age, which follows from biomass and
+        density, and for dead wood, which is what the stand's deaths keep up, where they are not given.
     output : "annual" for one row a year (columns `sim.state.RECORD`), "daily" for one row a day (`sim.state.DAILY`).
     constants, mechanisms, weather, boundary, soil_carbon, hwp_half_life_years, harvest_min_class, time_step_minutes,
     backend : see `sim.Stands`.

@@ -10,6 +10,7 @@ from statistics import NormalDist
 import numpy as np
 
 from sim import organic, soil, structure
+from sim.deadwood import MOST_DEADWOOD
 from sim.demography import AGE_CLASSES, AGES, OLDEST, first_ages, stem_weight
 from sim.jit import uncompiled
 from sim.parameters import SITE_PARAMETERS, check_mapping
@@ -46,6 +47,10 @@ INITIAL_RANGES = {
 }
 DRAWN = (*INITIAL_RANGES, "oldest_age_years")  # a number is drawn for each, whatever is given
 
+#: Dead wood of a stand before its first is found in spin-up [kgC m-2].
+SOME_DEADWOOD = 1.0
+DEADWOOD = tuple(f"{species}_deadwood" for species in ("conifer", "deciduous"))
+
 #: Stems by species and age class, which can be given instead of density, conifer fraction and oldest age.
 CLASS_NAMES = tuple(f"{species}_{age}_stems_ha" for species in ("conifer", "deciduous") for age in AGE_CLASSES)
 
@@ -56,6 +61,7 @@ INITIAL_LIMITS = {
     "biomass_kgc_m2": (0.0, 60.0),
     "soil_kgc_m2": (0.0, 100.0),
     "oldest_age_years": (1.0, 200.0),
+    **{f"{name}_kgc_m2": (0.0, MOST_DEADWOOD) for name in DEADWOOD},
     "hwp_kgc_m2": (0.0, 60.0),
     "organic_layer_m": (0.0, 2.0),
     **dict.fromkeys(CLASS_NAMES, (0.0, 10000.0)),
@@ -129,6 +135,7 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
         "conifer_biomass": conifer_biomass,
         "deciduous_biomass": biomass - conifer_biomass,
         "soil_carbon": stocks["soil_kgc_m2"],
+        **{name: stocks.get(f"{name}_kgc_m2", SOME_DEADWOOD) for name in DEADWOOD},
         "products": stocks.get("hwp_kgc_m2", 0.0),
         "organic_depth": depth,
         "canopy": winter,
@@ -309,7 +316,7 @@ def boundary_in_balance(parameters: dict, mean: float, heat: float, next_heat: f
 def soil_carbon_in_balance(soil, change, respired) -> np.ndarray:
     """Soil carbon [kgC m-2] whose respiration is what it gets, for respiration is in proportion to it.
 
-    soil : at the start of the year just run; change : what it gained; respired : what it lost to the air.
+    soil : at the start of the year just run; change : what it gained; respired : what it lost to the air itself.
     """
     rate = respired / (soil + 0.5 * change)
     limit = INITIAL_LIMITS["soil_kgc_m2"][1]

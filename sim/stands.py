@@ -13,6 +13,7 @@ import numpy as np
 
 from sim.block import BACKENDS, blocks, lanes_for, run_block
 from sim.closure import check_closure
+from sim.deadwood import deadwood_in_balance
 from sim.demography import AGES, first_ages
 from sim.draws import Seeds, draw_slice, draw_year, restored_generator
 from sim.management import check_actions, first_cut_age
@@ -20,6 +21,7 @@ from sim.parameters import check_constants, check_mechanisms, check_name, check_
 from sim.spin_up import (
     BOUNDARIES,
     BOUNDARY,
+    DEADWOOD,
     INITIAL_RANGES,
     SOIL_CARBONS,
     SPIN_UP_STEPS_PER_DAY,
@@ -129,9 +131,11 @@ class Stands:
             self._weather[stand] = np.random.default_rng(seeds[k].weather)
             self._disturbance[stand] = np.random.default_rng(seeds[k].disturbance)
         whole_year = observed is not None and len(observed) == DAYS * self.steps_per_day
-        last_year = self._spin_up(stands, observed if whole_year else None)
+        given = [(initial or {}).get(k) or {} for k in range(len(stands))]
+        found = np.array([[f"{name}_kgc_m2" not in stocks for name in DEADWOOD] for stocks in given])
+        last_year = self._spin_up(stands, found, observed if whole_year else None)
         if self.soil_carbon == "balanced":
-            drawn = [k for k in range(len(stands)) if "soil_kgc_m2" not in ((initial or {}).get(k) or {})]
+            drawn = [k for k in range(len(stands)) if "soil_kgc_m2" not in given[k]]
             if drawn:
                 self._balance_soil_carbon(stands[drawn], last_year[drawn])
 
@@ -139,22 +143,27 @@ class Stands:
         """First soil carbon that the litter keeps up; as drawn where there are no trees. record : of a year."""
         column = STATE_NAMES.index("soil_carbon")
         stocks = self.stocks(stands)
-        change, respired = (
-            record[:, RECORD_NAMES.index(name)] for name in ("soil_change_kgc_m2", "heterotrophic_respiration_kgc_m2")
-        )
-        balanced = soil_carbon_in_balance(stocks["soil_kgc_m2"], change, respired)
+        names = ("soil_change_kgc_m2", "heterotrophic_respiration_kgc_m2", "deadwood_respiration_kgc_m2")
+        change, respired, by_wood = (record[:, RECORD_NAMES.index(name)] for name in names)
+        balanced = soil_carbon_in_balance(stocks["soil_kgc_m2"], change, respired - by_wood)
         trees = stocks["density_stems_ha"] > 0.0
         self.state[stands, column] = np.where(trees, balanced, stocks["soil_kgc_m2"])
 
-    def _spin_up(self, stands, observed=None) -> np.ndarray:
+    def _spin_up(self, stands, deadwood_found, observed=None) -> np.ndarray:
         """Bring soil, snow and water, and the boundary if it is to be, into balance, with the stand held as it is.
 
+        deadwood_found : bool (stands, species), whose dead wood is to be what the stand's deaths keep up.
         Returns the last year's record.
         """
         first = self.state[stands].copy()
         held = [STATE_NAMES.index(name) for name in HELD_IN_SPIN_UP] + list(range(len(STATE), STATE_SIZE))
         deep, surface = STATE_NAMES.index("deep_heat"), RECORD_NAMES.index("surface_soil_temperature_c")
         deep_mean, boundary = RECORD_NAMES.index("deep_soil_temperature_c"), PARAMETER_NAMES.index(BOUNDARY)
+        wood = [STATE_NAMES.index(name) for name in DEADWOOD]
+        died, decayed = (
+            [RECORD_NAMES.index(f"{name}_{flux}_kgc_m2") for name in DEADWOOD] for flux in ("input", "decay")
+        )
+        living = self.stocks(stands)["density_stems_ha"] > 0.0
         draws = np.zeros((len(stands), DRAWS_SIZE))
         for name, values in climate_draws(
             self.weather["weather_as_observed"], self.constants["temperature_persistence"]
@@ -167,6 +176,8 @@ class Stands:
             heat = self.state[stands, deep].copy()
             state, record = self._run(stands, draws, nothing, observed, steps_per_day=steps)
             self._check(stands, state, record, "spin-up")
+            balanced = deadwood_in_balance(first[:, wood], record[:, died], record[:, decayed])
+            first[:, wood] = np.where(deadwood_found, balanced * living[:, None], first[:, wood])
             state[:, held] = first[:, held]
             gain = state[:, deep] - heat
             if year > 0:  # the first year only lays the snow
@@ -219,6 +230,7 @@ class Stands:
             "conifer_fraction": np.where(density > 0.0, conifers / np.where(density > 0.0, density, 1.0), 0.0),
             "biomass_kgc_m2": column("conifer_biomass") + column("deciduous_biomass"),
             "soil_kgc_m2": column("soil_carbon").copy(),
+            "deadwood_kgc_m2": column("conifer_deadwood") + column("deciduous_deadwood"),
             "age_classes": classes,
         }
 
@@ -283,8 +295,16 @@ class Stands:
         check_closure(state, record, self.parameters[stands], describe)
 
 
-#: Stocks that spin-up leaves as they were drawn.
-HELD_IN_SPIN_UP = ("conifer_biomass", "deciduous_biomass", "soil_carbon", "products", "organic_depth", "drought")
+#: Stocks that spin-up leaves as they were drawn, but for dead wood, which it finds.
+HELD_IN_SPIN_UP = (
+    "conifer_biomass",
+    "deciduous_biomass",
+    "soil_carbon",
+    *DEADWOOD,
+    "products",
+    "organic_depth",
+    "drought",
+)
 
 
 def available_cores() -> int:

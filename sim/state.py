@@ -9,6 +9,7 @@ import functools
 
 import numpy as np
 
+from sim.assortment import PRODUCTS
 from sim.demography import AGE_CLASSES, AGES
 from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS
 from sim.physical_constants import DAYS_PER_YEAR
@@ -20,6 +21,8 @@ STATE = {
     "conifer_biomass": ("kgC m-2", "carbon of living conifers"),
     "deciduous_biomass": ("kgC m-2", "carbon of living deciduous trees"),
     "soil_carbon": ("kgC m-2", "carbon of litter and soil"),
+    "conifer_deadwood": ("kgC m-2", "carbon of dead conifer stems"),
+    "deciduous_deadwood": ("kgC m-2", "carbon of dead deciduous stems"),
     "products": ("kgC m-2", "carbon of harvested wood products"),
     "organic_depth": ("m", "depth of moss and organic layer"),
     "canopy": ("degC", "canopy temperature, where Newton starts"),
@@ -64,25 +67,40 @@ RECORD = {
     },
     "biomass_kgc_m2": ("kgC m-2", "living trees at the year's end"),
     "soil_kgc_m2": ("kgC m-2", "litter and soil at the year's end"),
+    "conifer_deadwood_kgc_m2": ("kgC m-2", "dead conifer stems at the year's end"),
+    "deciduous_deadwood_kgc_m2": ("kgC m-2", "dead deciduous stems at the year's end"),
     "hwp_kgc_m2": ("kgC m-2", "stock of wood products at the year's end"),
     "gpp_kgc_m2": ("kgC m-2", "gross primary production, of trees and understorey"),
     "autotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of trees and understorey"),
-    "heterotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of litter and soil"),
+    "heterotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of litter, dead wood and soil"),
     "litterfall_kgc_m2": ("kgC m-2", "litter from living trees to the soil"),
     "understorey_gpp_kgc_m2": ("kgC m-2", "gross primary production of the understorey alone"),
     "understorey_litter_kgc_m2": ("kgC m-2", "its net production, all of it litter, to the soil"),
     "mortality_kgc_m2": (
         "kgC m-2",
-        "carbon of trees that died of age, crowding or insects, or was left when the last stem went, to the soil",
+        "carbon of trees that died of age, crowding or insects, or was left when the last stem went",
     ),
-    "fire_mortality_kgc_m2": ("kgC m-2", "carbon of trees killed by fire and not burned, to the soil"),
-    "fire_loss_kgc_m2": ("kgC m-2", "carbon burned, trees and organic layer"),
+    "fire_mortality_kgc_m2": ("kgC m-2", "carbon of trees killed by fire and not burned"),
+    "dead_litter_kgc_m2": ("kgC m-2", "part of both from leaves and branches, to the soil"),
+    "conifer_deadwood_input_kgc_m2": ("kgC m-2", "part of both from conifer stems, to dead wood"),
+    "deciduous_deadwood_input_kgc_m2": ("kgC m-2", "part of both from deciduous stems, to dead wood"),
+    "conifer_deadwood_decay_kgc_m2": ("kgC m-2", "decay of dead conifer stems, to the soil, which respires most of it"),
+    "deciduous_deadwood_decay_kgc_m2": ("kgC m-2", "the same of deciduous stems"),
+    "deadwood_respiration_kgc_m2": ("kgC m-2", "part of the heterotrophic respiration from dead wood"),
+    "fire_loss_kgc_m2": ("kgC m-2", "carbon burned, trees, dead wood and organic layer"),
     "burned_trees_kgc_m2": ("kgC m-2", "part of it from living trees"),
     "burned_soil_kgc_m2": ("kgC m-2", "part of it from litter and soil"),
+    "conifer_deadwood_burned_kgc_m2": ("kgC m-2", "part of it from dead conifer stems"),
+    "deciduous_deadwood_burned_kgc_m2": ("kgC m-2", "part of it from dead deciduous stems"),
     "harvest_kgc_m2": ("kgC m-2", "carbon of trees cut"),
     "harvest_emission_kgc_m2": ("kgC m-2", "part of it lost at harvest"),
+    **{
+        f"{species}_{product}_kgc_m2": ("kgC m-2", f"{product.replace('_', ' ')} of {species} trees cut")
+        for species in ("conifer", "deciduous")
+        for product in PRODUCTS
+    },
     "hwp_decay_kgc_m2": ("kgC m-2", "carbon lost by decaying products"),
-    "net_carbon_change_kgc_m2": ("kgC m-2", "change of biomass, soil and products"),
+    "net_carbon_change_kgc_m2": ("kgC m-2", "change of biomass, dead wood, soil and products"),
     "precipitation_mm": ("mm", "rain and snow"),
     "snowfall_mm": ("mm", "of which snow"),
     "evapotranspiration_mm": ("mm", "transpiration, evaporation and sublimation"),
@@ -115,6 +133,7 @@ RECORD = {
     "advected_heat_mj_m2": ("MJ m-2", "heat that cold snow and warm rain brought, less what vapour and drainage took"),
     "deep_heat_gain_mj_m2": ("MJ m-2", "heat gained by the deep soil"),
     "growing_season_days": ("day", "days with a mean above 5 degC"),
+    "crown_cover": ("1", "share of the ground under crowns in the year, after a fire what is left"),
     "max_lai": ("m2 m-2", "largest leaf area"),
     "summer_albedo": ("1", "June to August"),
     "winter_albedo": ("1", "December to March"),
@@ -157,9 +176,22 @@ CARBON_BUDGETS = {
         ),
     ),
     "soil_kgc_m2": (
-        ("litterfall_kgc_m2", "understorey_litter_kgc_m2", "mortality_kgc_m2", "fire_mortality_kgc_m2"),
+        (
+            "litterfall_kgc_m2",
+            "understorey_litter_kgc_m2",
+            "dead_litter_kgc_m2",
+            "conifer_deadwood_decay_kgc_m2",
+            "deciduous_deadwood_decay_kgc_m2",
+        ),
         ("heterotrophic_respiration_kgc_m2", "burned_soil_kgc_m2"),
     ),
+    **{
+        f"{species}_deadwood_kgc_m2": (
+            (f"{species}_deadwood_input_kgc_m2",),
+            (f"{species}_deadwood_decay_kgc_m2", f"{species}_deadwood_burned_kgc_m2"),
+        )
+        for species in ("conifer", "deciduous")
+    },
     "hwp_kgc_m2": (("hwp_stored_kgc_m2",), ("hwp_decay_kgc_m2",)),
 }
 
@@ -169,7 +201,7 @@ DAILY = {
     "precipitation_mm": ("mm", "rain and snow"),
     "gpp_kgc_m2": ("kgC m-2", "gross primary production, of trees and understorey"),
     "autotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of trees and understorey"),
-    "heterotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of litter and soil"),
+    "heterotrophic_respiration_kgc_m2": ("kgC m-2", "respiration of litter, dead wood and soil"),
     "shortwave_mj_m2": ("MJ m-2", "incoming shortwave"),
     "net_radiation_mj_m2": ("MJ m-2", "net radiation of the stand"),
     "sensible_heat_mj_m2": ("MJ m-2", "sensible heat to the air"),
@@ -228,7 +260,7 @@ water_stress wet_coefficient wet_limit wind_below winter_air winter_days winter_
 floor_water layer_share organic organic_base organic_by_ground organic_conductance organic_sum surface_by_organic
 snow_optical_deciduous surface_new thaw_water wind
 co2_growth co2_stomata dry_air_conifer dry_air_deciduous efficiency_conifer efficiency_deciduous efficiency_understorey
-gpp_understorey mean_deficit photons ready_conifer ready_deciduous
+deadwood_before gpp_understorey mean_deficit photons ready_conifer ready_deciduous
 """.split()
 
 

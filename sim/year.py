@@ -6,6 +6,7 @@ A pure function of parameters, state, action and the year's random draws, all in
 from sim.account import clear_day, clear_year, end_day, write_record
 from sim.carbon import decay_products, respiration_rates
 from sim.day import begin_day
+from sim.deadwood import decay_deadwood
 from sim.demography import renew_stems, weigh_stems
 from sim.disturbance import insects
 from sim.forcing import hour_angles, site_angles, step_weather
@@ -48,6 +49,7 @@ def simulate_year(block, steps_per_day, days, observed, daily):
             step_weather(b, t, hours, seconds, today)
             simulate_step(b, seconds)
         settle_snow(b, steps_per_day)
+        decay_deadwood(b, steps_per_day)
         end_day(b, day, steps_per_day, daily)
         add_upper_ground(b)
     end_year(b)

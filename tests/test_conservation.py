@@ -31,7 +31,14 @@ CASES = {
     "physical-corners-120min": ("physical", "corners", 120, 96),
 }
 YEARS = 3
-HEAVY_STORES = ("conifer_biomass", "deciduous_biomass", "soil_carbon", "products")
+HEAVY_STORES = (
+    "conifer_biomass",
+    "deciduous_biomass",
+    "soil_carbon",
+    "conifer_deadwood",
+    "deciduous_deadwood",
+    "products",
+)
 WATER_STORES = ("swe", "canopy_snow", "canopy_rain", "organic_water", "soil_water")
 NEVER_NEGATIVE = (*HEAVY_STORES, *WATER_STORES, "organic_depth", "trunk_capacity", "drought", "albedo")
 MAY_BE_NAN = {"summer_albedo", "winter_albedo"}  # where no light arrives in the season
@@ -139,14 +146,22 @@ def test_carbon_of_each_stock(run):
         trees = store(year.after, HEAVY_STORES[:2]) - store(year.before, HEAVY_STORES[:2])
         soil = store(year.after, ["soil_carbon"]) - store(year.before, ["soil_carbon"])
         products = store(year.after, ["products"]) - store(year.before, ["products"])
-        to_soil = r.litterfall_kgc_m2 + r.mortality_kgc_m2 + r.fire_mortality_kgc_m2
+        dead = r.mortality_kgc_m2 + r.fire_mortality_kgc_m2
+        left = r.dead_litter_kgc_m2 + r.conifer_deadwood_input_kgc_m2 + r.deciduous_deadwood_input_kgc_m2
+        np.testing.assert_allclose(dead, left, rtol=0, atol=1e-12)
+        decayed = r.conifer_deadwood_decay_kgc_m2 + r.deciduous_deadwood_decay_kgc_m2
+        burned_wood = r.conifer_deadwood_burned_kgc_m2 + r.deciduous_deadwood_burned_kgc_m2
+        wood = store(year.after, HEAVY_STORES[3:5]) - store(year.before, HEAVY_STORES[3:5])
+        np.testing.assert_allclose(wood, left - r.dead_litter_kgc_m2 - decayed - burned_wood, atol=1e-10)
         below = r.understorey_litter_kgc_m2  # all that the understorey gains
         grown = r.gpp_kgc_m2 - r.autotrophic_respiration_kgc_m2 - below
-        burned_trees = grown - to_soil - r.harvest_kgc_m2 - trees
-        burned_soil = to_soil + below - r.heterotrophic_respiration_kgc_m2 - soil
+        burned_trees = grown - r.litterfall_kgc_m2 - dead - r.harvest_kgc_m2 - trees
+        to_soil = r.litterfall_kgc_m2 + r.dead_litter_kgc_m2 + decayed + below
+        burned_soil = to_soil - r.heterotrophic_respiration_kgc_m2 - soil
         np.testing.assert_allclose(burned_trees, r.burned_trees_kgc_m2, atol=1e-10)
         np.testing.assert_allclose(burned_soil, r.burned_soil_kgc_m2, atol=1e-10)
-        np.testing.assert_allclose(r.burned_trees_kgc_m2 + r.burned_soil_kgc_m2, r.fire_loss_kgc_m2, rtol=0, atol=1e-12)
+        burned = r.burned_trees_kgc_m2 + r.burned_soil_kgc_m2 + burned_wood
+        np.testing.assert_allclose(burned, r.fire_loss_kgc_m2, rtol=0, atol=1e-12)
         assert (r.fire_loss_kgc_m2[r.fire_mortality == 0.0] == 0.0).all()
         np.testing.assert_allclose(products, r.hwp_stored_kgc_m2 - r.hwp_decay_kgc_m2, atol=1e-10)
         np.testing.assert_allclose(r.harvest_kgc_m2, r.hwp_stored_kgc_m2 + r.harvest_emission_kgc_m2, atol=1e-12)
@@ -308,17 +323,24 @@ def test_a_stock_closes_from_the_columns_of_the_table(eventful_years, stock):
 def test_what_leaves_a_stock_arrives_in_another_or_leaves_the_stand(eventful_years):
     columns = {stock: (set(gains), set(losses)) for stock, (gains, losses) in CARBON_BUDGETS.items()}
     gained, lost = (set.union(*(each[k] for each in columns.values())) for k in range(2))
-    assert gained - lost == {"gpp_kgc_m2", "hwp_stored_kgc_m2"}  # from the air; of the harvest
+    wood = {f"{species}_deadwood_{{}}_kgc_m2" for species in ("conifer", "deciduous")}
+    of_the_dead = {"dead_litter_kgc_m2", *(name.format("input") for name in wood)}
+    assert gained - lost == {"gpp_kgc_m2", "hwp_stored_kgc_m2", *of_the_dead}  # from the air; of the harvest
     assert lost - gained == {
         "autotrophic_respiration_kgc_m2",
         "heterotrophic_respiration_kgc_m2",
         "burned_trees_kgc_m2",
         "burned_soil_kgc_m2",
+        *(name.format("burned") for name in wood),
+        "mortality_kgc_m2",  # to dead wood and soil
+        "fire_mortality_kgc_m2",
         "harvest_kgc_m2",  # to products and air
         "hwp_decay_kgc_m2",
     }
     harvest = eventful_years.hwp_stored_kgc_m2 + eventful_years.harvest_emission_kgc_m2
     np.testing.assert_allclose(eventful_years.harvest_kgc_m2, harvest, rtol=0, atol=1e-12)
+    dead = eventful_years.mortality_kgc_m2 + eventful_years.fire_mortality_kgc_m2
+    np.testing.assert_allclose(dead, eventful_years[list(of_the_dead)].sum(axis=1), rtol=0, atol=1e-12)
 
 
 def test_fire_moves_carbon_between_named_fluxes_only():

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tiny_runs import TINY_RUNS, write_run
+from tiny_runs import TINY_RUNS, write_run, write_run_of_three
 
 from analysis import experiments, make_figures, make_tables, methods
-from analysis.figures import training_dynamics
+from analysis.figures import many_objectives, training_dynamics
 from analysis.figures.common import no_data
 from analysis.results import Results
 
@@ -77,6 +77,38 @@ def test_the_same_bytes_again(tmp_path, monkeypatch):
     assert names == ["training_dynamics.pdf", "training_dynamics.png"]
     for name in names:
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
+
+
+def test_three_objectives_have_a_figure_of_their_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(make_figures, "FIGURES", ())
+    returns = np.array([[3.0, 0.0, 1.0], [0.0, 5.0, 1.0], [1.0, 1.0, 2.0]])  # at all weight on each
+    for seed in (1, 2):
+        write_run_of_three(tmp_path / "runs" / f"ours {seed}", "ppo_gated", seed * returns, seed)
+    write_run_of_three(tmp_path / "runs" / "zero", "zero_change", np.full((3, 3), 0.5))
+    for name in ("first", "second"):
+        make_figures.main(make_figures.Args(runs_dir=(tmp_path / "runs",), figures_dir=tmp_path / name))
+    names = sorted(path.name for path in (tmp_path / "first").iterdir())
+    assert names == ["many_objectives_timber-v0.pdf", "many_objectives_timber-v0.png"]
+    for name in names:
+        assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
+
+    results = Results((tmp_path / "runs",), experiments.jobs(), TINY_RUNS / "no studies")
+    figure = Figure()
+    many_objectives.figures(results)["many_objectives_timber-v0"][1](figure)
+    lines, *triangles = figure.get_axes()[:4]
+    curves = [line for line in lines.lines if len(line.get_xdata()) == 3]
+    assert len(curves) == 4  # three weights, and zero change, which looks at none
+    mean = 1.5 * returns
+    low, high = np.minimum(mean.min(axis=0), 0.5), mean.max(axis=0)
+    drawn = {line.get_color(): line.get_ydata() for line in curves}
+    for colour, point in zip(many_objectives.COLOURS, mean, strict=False):
+        np.testing.assert_allclose(drawn[colour], (point - low) / (high - low))
+    np.testing.assert_allclose(drawn[many_objectives.REFERENCE], (0.5 - low) / (high - low))
+    for k, triangle in enumerate(triangles):
+        points = triangle.collections[0]
+        corner = points.get_offsets()[np.argmax(points.get_array())]
+        np.testing.assert_allclose(corner, [[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]][k], atol=1e-12)
+    assert not many_objectives.figures(Results((TINY_RUNS,), experiments.jobs(), TINY_RUNS / "no studies"))
 
 
 def test_without_runs_it_names_a_command(tmp_path):

@@ -144,9 +144,10 @@ def test_constants_of_the_reward_do_what_they_say():
     env = quick(reward=constants, record_years=True, initial_ranges=ranges, mechanisms={"fire": False})
     _, rewards, info = play(env, [2] * 4, seed=1)
     y = info["years"]
+    deadwood = y["conifer_deadwood_kgc_m2"] + y["deciduous_deadwood_kgc_m2"]
     expected = (
         np.clip(y["net_carbon_change_kgc_m2"] / 0.5, -1.0, 1.0)
-        + 0.1 * np.clip((y["biomass_kgc_m2"] + y["soil_kgc_m2"]) / 50.0, 0.0, 1.0)
+        + 0.1 * np.clip((y["biomass_kgc_m2"] + deadwood + y["soil_kgc_m2"]) / 50.0, 0.0, 1.0)
         + 0.2 * np.clip(y["hwp_stored_kgc_m2"], 0.0, 1.0)
     )
     assert y["hwp_stored_kgc_m2"].min() > 0.0

@@ -90,13 +90,17 @@ def episode():
     return eventful_episode()
 
 
+def deadwood(r):
+    return r["conifer_deadwood_kgc_m2"] + r["deciduous_deadwood_kgc_m2"]
+
+
 # Name of an entry -> its value after year t, from the annual record.
 FORMULAS = {
     "preference": lambda r, t: 0.3,
     "year": lambda r, t: (t + 1) / 50.0,
     "density": lambda r, t: r["density_stems_ha"][t] / 1500.0,
     "conifer_fraction": lambda r, t: r["conifer_fraction"][t],
-    "carbon_stock": lambda r, t: (r["biomass_kgc_m2"][t] + r["soil_kgc_m2"][t]) / 50.0,
+    "carbon_stock": lambda r, t: (r["biomass_kgc_m2"][t] + deadwood(r)[t] + r["soil_kgc_m2"][t]) / 50.0,
     "fire_mortality_1yr": lambda r, t: r["fire_mortality"][t],
     "fire_mortality_2yr": lambda r, t: r["fire_mortality"][t - 1] if t else 0.0,
     "insect_mortality_1yr": lambda r, t: r["insect_mortality"][t],

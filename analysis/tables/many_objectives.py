@@ -43,6 +43,11 @@ def detailed_table(rows: dict, objectives) -> tuple[pd.DataFrame, dict]:
     return pd.DataFrame(found), columns
 
 
+def file_stem(env_id: str) -> str:
+    """An environment's id as part of a file's name."""
+    return env_id.split(":")[-1].replace("/", "-")
+
+
 def make(results) -> dict[str, tuple[pd.DataFrame, dict]]:
     """File name -> table and columns."""
     tables = {}
@@ -50,7 +55,7 @@ def make(results) -> dict[str, tuple[pd.DataFrame, dict]]:
         rows = {key: one for key, one in results.rows.items() if key[1] == env_id and one}
         objectives = results.objectives(env_id)
         if objectives != PAIR:
-            name = env_id.split(":")[-1].replace("/", "-")
+            name = file_stem(env_id)
             tables[f"main_results_{name}"] = main_table(rows, objectives)
             tables[f"detailed_objectives_{name}"] = detailed_table(rows, objectives)
     return tables

@@ -15,6 +15,7 @@ from sim.task.objectives import (
     HISTORY_NAMES,
     PAPER_OBJECTIVES,
     THAW_FORMULATIONS,
+    TIMBER,
     Objective,
     Reward,
     check_objectives,
@@ -23,6 +24,7 @@ from sim.task.objectives import (
 )
 from sim.task.observation import Moment, Table, observation_rows
 from sim.task.preference import check_weights, draw_weights, shown
+from sim.task.timber import TIMBER_COLUMNS, Timber, countries
 
 MODES = ("generalist", "site_specific")
 
@@ -53,6 +55,8 @@ class Episodes:
         reward=None,
         balanced=False,
         objectives=PAPER_OBJECTIVES,
+        timber=None,
+        discount_rate=0.03,
         mechanisms=None,
         constants=None,
         weather="paper",
@@ -89,8 +93,13 @@ class Episodes:
         if fixed_preference is not None:
             self.fixed_weights = check_weights(fixed_preference, len(objectives), "fixed_preference")
         self.own_objectives = [objective for objective in objectives if isinstance(objective, Objective)]
-        self.history_names = HISTORY_NAMES + tuple(
-            f"{objective.name}_{what}" for objective in self.own_objectives for what in ("clipped", "reward")
+        if timber is None and TIMBER in objectives:
+            raise ValueError(f"objective 'timber' needs prices: timber=, such as {', '.join(countries())}")
+        self.timber = None if timber is None else Timber(timber, discount_rate)
+        self.history_names = (
+            *HISTORY_NAMES,
+            *(TIMBER_COLUMNS if self.timber else ()),
+            *(f"{objective.name}_{what}" for objective in self.own_objectives for what in ("clipped", "reward")),
         )
         self.reward_columns = [self.history_names.index(f"{name}_reward") for name in self.objective_names]
         limits = [(o.low, o.high) if isinstance(o, Objective) else (-1.0, 1.0) for o in objectives]
@@ -170,8 +179,11 @@ class Episodes:
         actions = check_actions(actions, self.number)
         record = self.stands.step(actions)
         parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
+        by_name = dict(zip(sim.RECORD_NAMES, record.T, strict=True))
+        if self.timber:
+            parts |= self.timber.columns(by_name, self.year)
         for objective in self.own_objectives:
-            parts |= objective.columns(dict(zip(sim.RECORD_NAMES, record.T, strict=True)) | parts)
+            parts |= objective.columns(by_name | parts)
         added = np.array([parts[name] for name in self.history_names[record.shape[1] :]])
         year = np.concatenate([record, added.T], axis=1)
         self.history[np.arange(self.number), self.year] = year
@@ -234,6 +246,8 @@ class Episodes:
             "mean_conifer_fraction": mean("conifer_fraction"),
             **{name: mean(name) for name in ("growing_season_days", "latent_heat_mj_m2", "ground_shortwave_mj_m2")},
         }
+        if self.timber:
+            info["net_present_value_eur_ha"] = float(years["discounted_revenue_eur_ha"].sum())
         if self.record_years:
             record = {name: column.copy() for name, column in years.items()}
             info["years"] = {"year": np.arange(1, self.year[i] + 1), **record}

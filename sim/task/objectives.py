@@ -9,6 +9,8 @@ import numpy as np
 import sim
 from sim.management import decode, missed_share
 from sim.parameters import check_name
+from sim.task.biodiversity import biodiversity_reward
+from sim.task.timber import timber_reward
 
 THAW_FORMULATIONS = ("asymmetric", "contrast", "raw_degree_days")
 COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
@@ -83,7 +85,8 @@ def reward_components(record: np.ndarray, density_change: np.ndarray, reward: Re
 
     biomass, soil = column("biomass_kgc_m2"), column("soil_kgc_m2")
     change = column("net_carbon_change_kgc_m2") / reward.carbon_scale
-    stock = (biomass + soil) / reward.stock_scale
+    deadwood = column("conifer_deadwood_kgc_m2") + column("deciduous_deadwood_kgc_m2")
+    stock = (biomass + deadwood + soil) / reward.stock_scale
     products = column("hwp_stored_kgc_m2") / reward.product_scale
     gains = {
         "carbon_change": np.clip(change, -1.0, 1.0),
@@ -169,9 +172,10 @@ class Objective:
     """An objective of your own, beside the paper's "carbon" and "thaw".
 
     value : function of the year's record to rewards (n,). The record is a dict of read-only columns (n,): those of
-    `HISTORY_NAMES` and of objectives before this one. For worker processes and pickling, a function at the top level
-    of a module. low, high : limits of the reward; values are clipped to them. The record gets the columns
-    `<name>_reward` and `<name>_clipped` (what was cut off), the last step's info `<name>_return`.
+    `HISTORY_NAMES`, of `TIMBER_COLUMNS` with prices, and of objectives before this one. For worker processes and
+    pickling, a function at the top level of a module. low, high : limits of the reward; values are clipped to them. The
+    record gets the columns `<name>_reward` and `<name>_clipped` (what was cut off), the last step's info
+    `<name>_return`.
     """
 
     name: str
@@ -220,22 +224,31 @@ def frozen_ground(year: dict[str, np.ndarray]) -> np.ndarray:
     return -1.0 - year["upper_ground_heat_mj_m2"] / UPPER_GROUND_HEAT_SCALE
 
 
-#: Objectives that can be asked for by name, beside the paper's: thaw as the field measures it.
+#: Thaw as the field measures it.
 FIELD_OBJECTIVES = {
     "active_layer": Objective("active_layer", shallow_thaw),
     "permafrost_heat": Objective("permafrost_heat", frozen_ground),
 }
 
+TIMBER = Objective("timber", timber_reward)
+
+#: All objectives that can be asked for by name, beside the paper's.
+READY_OBJECTIVES = {
+    **FIELD_OBJECTIVES,
+    "timber": TIMBER,
+    "biodiversity": Objective("biodiversity", biodiversity_reward, low=0.0),
+}
+
 
 def check_objectives(objectives: Sequence) -> tuple:
     """Objectives of an environment, each once: names of the paper's, and `Objective`s, of which some have a name."""
-    allowed = (*PAPER_OBJECTIVES, *FIELD_OBJECTIVES)
+    allowed = (*PAPER_OBJECTIVES, *READY_OBJECTIVES)
     if isinstance(objectives, str) or not np.iterable(objectives) or not len(objectives):
         raise ValueError(f"objectives: a sequence of {', '.join(allowed)} and Objective, got {objectives!r}")
     for objective in objectives:
         if not isinstance(objective, Objective):
             check_name("objective", objective, allowed)
-    objectives = [FIELD_OBJECTIVES.get(o, o) if isinstance(o, str) else o for o in objectives]
+    objectives = [READY_OBJECTIVES.get(o, o) if isinstance(o, str) else o for o in objectives]
     names = objective_names(objectives)
     if len(set(names)) < len(names):
         raise ValueError(f"objectives {', '.join(names)}: each is allowed once")

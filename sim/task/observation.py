@@ -102,8 +102,8 @@ def years(now: Moment) -> np.ndarray:
 
 
 def carbon_stock(now: Moment) -> np.ndarray:
-    """Carbon of the living trees and the soil."""
-    return now.stocks["biomass_kgc_m2"] + now.stocks["soil_kgc_m2"]
+    """Carbon of the living trees, dead wood and the soil."""
+    return now.stocks["biomass_kgc_m2"] + now.stocks["deadwood_kgc_m2"] + now.stocks["soil_kgc_m2"]
 
 
 def growing_season_length(now: Moment) -> np.ndarray:
@@ -179,7 +179,7 @@ ROWS = (
     Observed("year", "state", "yr", 0, 50, 0, 1000, years),
     Observed("density", "state", "stems ha-1", 0, 1500, 0, 15000, stock("density_stems_ha")),
     Observed("conifer_fraction", "state", "1", 0, 1, 0, 1, stock("conifer_fraction")),
-    Observed("carbon_stock", "state", "kgC m-2", 0, 50, 0, 2 * STOCK, carbon_stock),
+    Observed("carbon_stock", "state", "kgC m-2", 0, 50, 0, 3 * STOCK, carbon_stock),
     climate("latitude", "degN", -50, 20, of="latitude_deg"),
     climate("mean_annual_temperature", "degC", 10, 20, of="mean_annual_temperature_c"),
     climate("seasonal_amplitude", "degC", 0, 30, of="seasonal_amplitude_c"),

@@ -32,7 +32,7 @@ SNOWY_MM = 5.0  # water equivalent from which the ground is drawn white
 
 INK, FAINT = "#22303c", "#8a96a0"
 CONIFER, DECIDUOUS = "#1f6f5c", "#e6a020"
-SOIL, BIOMASS, PRODUCTS = "#6b4226", "#93b36b", "#f0dca0"
+SOIL, DEADWOOD, BIOMASS, PRODUCTS = "#6b4226", "#b3a59a", "#93b36b", "#f0dca0"
 RETURNS = ("#111111", "#0072b2", "#d55e00", "#009e73", "#cc79a7")  # of the objectives, over again beyond five
 ORGANIC, THAWED, FROZEN_WARM, FROZEN_COLD = "#3d2b1f", "#a9825a", "#d3e6f2", "#7fb0d3"
 SMALL, LARGE = 7.5, 9.5  # points
@@ -42,6 +42,9 @@ SCENE, GROUND = (0.0, 0.385, 0.655, 0.535), (0.052, 0.075, 0.603, 0.31)  # left,
 CHART_LEFT, CHART_WIDTH, CHART_HEIGHT, CHART_GAP = 0.715, 0.262, 0.142, 0.087
 CHARTS = [(CHART_LEFT, bottom, CHART_WIDTH, CHART_HEIGHT) for bottom in (0.744, 0.515)]
 RETURN_BOTTOM, RETURN_HEIGHT = 0.057, 2 * CHART_HEIGHT + CHART_GAP  # of the returns' charts, all together
+
+CARBON_STOCKS = ("biomass_kgc_m2", "deadwood_kgc_m2", "soil_kgc_m2")
+DEADWOODS = ("conifer_deadwood", "deciduous_deadwood")
 
 #: The scene in metres at its front edge; the camera stands before it. At distance d all is smaller by
 #: CAMERA_M / (CAMERA_M + d), and the view is as much wider, so that PLOT_M x d + d^2 is the area up to there.
@@ -87,13 +90,16 @@ def view_of(episodes, i: int) -> View:
     history = {name: years[:, k] for k, name in enumerate(episodes.history_names)}
     row = episodes.stands.state[i]
     stocks = episodes.stands.stocks([i])
-    start = {name: float(stocks[name][0]) for name in ("biomass_kgc_m2", "soil_kgc_m2")} | {"hwp_kgc_m2": 0.0}
+    start = {name: float(stocks[name][0]) for name in CARBON_STOCKS} | {"hwp_kgc_m2": 0.0}
+    history["deadwood_kgc_m2"] = sum(history[f"{name}_kgc_m2"] for name in DEADWOODS)
     if len(years):
-        for name, change in (
-            ("biomass_kgc_m2", "biomass_change_kgc_m2"),
-            ("soil_kgc_m2", "soil_change_kgc_m2"),
-        ):
-            start[name] = history[name][0] - history[change][0]
+        changes = {name: history[f"{name}_change_kgc_m2"][0] for name in ("biomass", "soil")}
+        fluxes = (("input", 1.0), ("decay", -1.0), ("burned", -1.0))
+        changes["deadwood"] = sum(
+            sign * history[f"{name}_{flux}_kgc_m2"][0] for name in DEADWOODS for flux, sign in fluxes
+        )
+        for name, change in changes.items():
+            start[f"{name}_kgc_m2"] = history[f"{name}_kgc_m2"][0] - change
     return View(
         seed=int(episodes.episode_seeds[i]),
         weights=dict(zip(episodes.objective_names, episodes.weights[i].tolist(), strict=True)),
@@ -413,6 +419,7 @@ def draw_years(figure, view: View) -> None:
 
     layers = [
         ("soil", "soil_kgc_m2", SOIL),
+        ("dead wood", "deadwood_kgc_m2", DEADWOOD),
         ("trees", "biomass_kgc_m2", BIOMASS),
         ("products", "hwp_kgc_m2", PRODUCTS),
     ]
