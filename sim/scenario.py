@@ -28,13 +28,13 @@ COLUMNS = {
 }
 
 
-def _read() -> dict[str, dict[str, list[float]]]:
+def _read() -> dict[str, dict[str, list]]:
     lines = (files("sim") / TABLE).read_text(encoding="utf-8").splitlines()
-    paths: dict[str, dict[str, list[float]]] = {}
+    paths: dict[str, dict[str, list]] = {}
     for row in csv.DictReader(line for line in lines if not line.startswith("#")):
-        path = paths.setdefault(row.pop("scenario"), {name: [] for name in row})
-        for name, value in row.items():
-            path[name].append(float(value))
+        path = paths.setdefault(row["scenario"], {name: [] for name in ("year", *COLUMNS)})
+        for name, values in path.items():
+            values.append(int(row[name]) if name == "year" else float(row[name]))
     return paths
 
 
@@ -71,7 +71,7 @@ def check_scenario(scenario) -> Path | None:
         table = SCENARIOS[scenario]
         first = table["year"].index(FIRST_YEAR)
         columns = {name: np.array(table[name][first:]) for name in COLUMNS}
-        return Path(columns, f"{scenario} is from {FIRST_YEAR} to {table['year'][-1]:.0f}")
+        return Path(columns, f"{scenario} is from {FIRST_YEAR} to {table['year'][-1]}")
     if not isinstance(scenario, Mapping) and not hasattr(scenario, "columns"):
         named = ", ".join(SCENARIOS)
         raise ValueError(f"scenario {scenario!r}: allowed are None, {named}, or a dict or DataFrame of a path by year")
