@@ -1,8 +1,9 @@
 """BoreaRL: managing a boreal stand for carbon and for permafrost, as a mo-gymnasium environment.
 
-`import boreal_env` registers `boreal-generalist-v0`, `boreal-site-specific-v0` and `boreal-balanced-v0`. Here are the
-environment of one stand, with its manual, and that of many in lockstep. What they are made of is in `sim/task/`: what
-is observed, which actions are valid, what is rewarded, the preference, and the episodes that both share.
+`import boreal_env` registers `boreal-generalist-v0`, `boreal-site-specific-v0`, `boreal-balanced-v0` and
+`boreal-warming-v0`. Here are the environment of one stand, with its manual, and that of many in lockstep. What they are
+made of is in `sim/task/`: what is observed, which actions are valid, what is rewarded, the preference, and the episodes
+that both share.
 """
 
 import gymnasium as gym
@@ -169,7 +170,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     returns vary equally between policies. `boreal-generalist-v0` and `boreal-site-specific-v0` are the paper's: use
     them to compare with it. There the boundary's temperature is drawn without regard to the climate, and so which
     site was drawn decides nearly all of the thaw return. `boreal-timber-v0` is the balanced task with a third
-    objective, timber at Finnish prices, `boreal-four-v0` with biodiversity as a fourth.
+    objective, timber at Finnish prices, `boreal-four-v0` with biodiversity as a fourth. `boreal-warming-v0` is it from
+    2025 on under the scenario SSP2-4.5: the ground starts in balance with the climate of 1995-2014, and warms.
 
     ## Episode Termination
     After 50 years the episode is terminated: nothing is worth anything beyond.
@@ -197,6 +199,10 @@ class BorealEnv(Described, gym.Env, EzPickle):
       keeps up, at least 2 kgC/m2; as drawn without trees
     - `weather`: "paper", or "observed" (`boreal-balanced-v0`): temperature, wet days and wind vary from day to day as
       on record, and means stay
+    - `scenario`: None, or climate change from the first year, 2025, on: "ssp126", "ssp245" (`boreal-warming-v0`) or
+      "ssp585", to 2100, or a dict or DataFrame with a value a year of any of `warming_k`, `warming_amplitude_k` (on the
+      warmest day; below 0, winters warm more), `precipitation_factor` and `co2_ppm`. It is not observed, but the year
+      is, and the path is the same in every episode; the climate that is observed stays the site's own
     - `objectives`: of the reward vector, "carbon", "thaw", "active_layer", "permafrost_heat", "timber", "biodiversity"
       and any `Objective` of your own
     - `timber`: prices and costs, which "timber" needs: "finland", "sweden" or "canada" of `sim/timber_prices.csv`, a
@@ -444,6 +450,7 @@ REGISTERED: dict[str, dict] = {
         "objectives": ("carbon", "thaw", "timber", "biodiversity"),
         "timber": "finland",
     },
+    "boreal-warming-v0": {"mode": "generalist", "balanced": True, **BALANCED_WORLD, "scenario": "ssp245"},
 }
 for _name, _kwargs in REGISTERED.items():
     gym.register(

@@ -16,6 +16,7 @@ from sim.parameters import (
     sample_site,
     scale_site,
 )
+from sim.scenario import SCENARIOS
 from sim.simulate import simulate
 from sim.spin_up import INITIAL_RANGES
 from sim.stands import Stands
@@ -27,6 +28,7 @@ __all__ = [
     "MECHANISMS",
     "OBSERVED_SITE_PARAMETERS",
     "RECORD_NAMES",
+    "SCENARIOS",
     "SITE_PARAMETERS",
     "PhysicsError",
     "Seeds",

@@ -69,7 +69,10 @@ def sun(b, day):
 
 @phase
 def generated_weather(b, day):
-    """The day's weather from the site's climate and the day's draws."""
+    """The day's weather from the site's climate, the day's draws and how much warmer and wetter the year is.
+
+    Precipitation is that of the site's climate, times the year's factor: what comes with warming is in the factor.
+    """
     p, w, d = b.p, b.w, b.d
     angle = 2.0 * math.pi * (day + 0.5) / DAYS_PER_YEAR
     cosine, sine = math.cos(angle), math.sin(angle)
@@ -86,7 +89,7 @@ def generated_weather(b, day):
         spread = p.daily_noise_std_c[i] * between(1.0, larger, as_observed) * d.temperature_noise[day, i]
         memory = p.temperature_persistence[i]
         w.anomaly[i] = spread if first else memory * w.anomaly[i] + math.sqrt(1.0 - memory * memory) * spread
-        temperature = daily_mean_temperature(
+        climate = daily_mean_temperature(
             cosine,
             sine,
             w.cos_warmest[i],
@@ -97,7 +100,7 @@ def generated_weather(b, day):
         )
         kind = precipitation_season(
             day + 1,
-            temperature,
+            climate,
             p.summer_start_day[i],
             p.summer_end_day[i],
             p.spring_shoulder_start_day[i],
@@ -121,12 +124,12 @@ def generated_weather(b, day):
         sensitivity = p.winter_precip_temp_sensitivity[i] if winter else sensitivity
         # Rain follows the temperature of the season; snowfall that of the day's weather: cold spells are dry, but
         # January is not drier than November.
-        departure = w.anomaly[i] * p.snowfall_limit[i] if winter else temperature - base
+        departure = w.anomaly[i] * p.snowfall_limit[i] if winter else climate - base
         scale = 1.0 + p.snowfall_limit[i] * (p.snowfall_scale[i] - 1.0)
         mean = mean * scale if winter else mean
         oftener = between(1.0, wet_day_factor(probability, p.wet_day_factor[i]), as_observed)
         swing = as_observed * w.anomaly[i] * (p.snowfall_limit[i] if winter else 1.0)
-        precipitation = daily_precipitation(
+        precipitation = p.precipitation_factor[i] * daily_precipitation(
             d.wet_dice[day, i],
             d.wet_amount[day, i],
             probability * oftener,
@@ -136,6 +139,15 @@ def generated_weather(b, day):
             swing,
         )
         wet = precipitation >= WET_DAY_MM
+        temperature = daily_mean_temperature(
+            cosine,
+            sine,
+            w.cos_warmest[i],
+            w.sin_warmest[i],
+            p.warming_k[i],
+            p.warming_amplitude_k[i],
+            climate,
+        )
 
         dry_humidity = of_season(
             day, p.humidity_dry_winter[i], p.humidity_dry_spring[i], p.humidity_dry_summer[i], p.humidity_dry_autumn[i]

@@ -37,6 +37,7 @@ def simulate(
     weather="paper",
     boundary="sampled",
     soil_carbon="drawn",
+    scenario=None,
     hwp_half_life_years=None,
     harvest_min_class="young",
 ):
@@ -59,6 +60,7 @@ def simulate(
         class (conifer_mature_stems_ha, ...); the rest is drawn, but for the stems' age, which follows from biomass and
         density, and for dead wood, which is what the stand's deaths keep up, where they are not given.
     output : "annual" for one row a year (columns `sim.state.RECORD`), "daily" for one row a day (`sim.state.DAILY`).
+    scenario : climate change, see `sim.Stands`; not with `forcing`, which is weather of its own.
     constants, mechanisms, weather, boundary, soil_carbon, hwp_half_life_years, harvest_min_class, time_step_minutes,
     backend : see `sim.Stands`.
 
@@ -85,9 +87,14 @@ def simulate(
         weather=weather,
         boundary=boundary,
         soil_carbon=soil_carbon,
+        scenario=scenario,
         hwp_half_life_years=hwp_half_life_years,
         harvest_min_class=harvest_min_class,
     )
+    if stand.scenario is not None:
+        if forcing is not None:
+            raise ValueError("scenario: only generated weather can change; with forcing, None is allowed")
+        stand.scenario.check_years(int(years))
     observed, days = None, DAYS
     if forcing is not None:
         observed, days = check_forcing(forcing, time_step_minutes, int(years))

@@ -18,6 +18,7 @@ from sim.demography import AGES, first_ages
 from sim.draws import Seeds, draw_slice, draw_year, restored_generator
 from sim.management import check_actions, first_cut_age
 from sim.parameters import check_constants, check_mechanisms, check_name, check_weather
+from sim.scenario import CO2, WITHOUT_SCENARIO, check_scenario
 from sim.spin_up import (
     BOUNDARIES,
     BOUNDARY,
@@ -61,6 +62,8 @@ class Stands:
         it below the first stand, whatever the site's (`parameters` have it from `start` on).
     soil_carbon : first soil carbon: "drawn", or "balanced", what the first stand's litter keeps up, where it is not
         given.
+    scenario : climate change, year by year from the start on: None, a name of `sim.SCENARIOS`, or a path of your own
+        (see `sim.scenario.check_scenario`). Spin-up is without it, and so is the boundary.
     hwp_half_life_years : half-life of wood products; None keeps them for ever, as the paper does.
     harvest_min_class : youngest age class that thinning may cut: "young", "mature" or "old".
     threads : threads for more than one block; None is one a core.
@@ -79,6 +82,7 @@ class Stands:
         weather="paper",
         boundary="sampled",
         soil_carbon="drawn",
+        scenario=None,
         hwp_half_life_years=None,
         harvest_min_class="young",
         threads=None,
@@ -96,6 +100,9 @@ class Stands:
         self.weather = check_weather(weather)
         self.boundary = check_name("boundary", boundary, BOUNDARIES)
         self.soil_carbon = check_name("soil_carbon", soil_carbon, SOIL_CARBONS)
+        self.scenario = check_scenario(scenario)
+        if self.scenario is not None and CO2 in self.scenario.names and CO2 in (constants or {}):
+            raise ValueError(f"constants: {CO2} follows the scenario; a value of your own is not allowed")
         self.first_cut_age = first_cut_age(harvest_min_class, self.constants)
         self.products_decay = yearly_decay(hwp_half_life_years)
         self.threads = available_cores() if threads is None else _positive_integer("threads", threads)
@@ -122,7 +129,7 @@ class Stands:
         ranges = {**INITIAL_RANGES, **(initial_ranges or {})}
         for k, stand in enumerate(stands):
             site = sites[k]
-            values = {**site, **self.constants, **self.mechanisms, **self.weather}
+            values = {**site, **self.constants, **self.mechanisms, **self.weather, **WITHOUT_SCENARIO}
             self.parameters[stand] = [values[name] for name in PARAMETER_NAMES]
             generator = np.random.default_rng(seeds[k].start)
             self.state[stand] = first_state(values, generator, (initial or {}).get(k), ranges)
@@ -175,7 +182,7 @@ class Stands:
         for year in range(SPIN_UP_YEARS):
             heat = self.state[stands, deep].copy()
             state, record = self._run(stands, draws, nothing, observed, steps_per_day=steps)
-            self._check(stands, state, record, "spin-up")
+            self._check(stands, self.parameters[stands], state, record, "spin-up")
             balanced = deadwood_in_balance(first[:, wood], record[:, died], record[:, decayed])
             first[:, wood] = np.where(deadwood_found, balanced * living[:, None], first[:, wood])
             state[:, held] = first[:, held]
@@ -201,18 +208,28 @@ class Stands:
         """
         stands = np.arange(self.number) if stands is None else np.atleast_1d(np.asarray(stands, dtype=int))
         actions = check_actions(actions, len(stands))
+        parameters = self.parameters_of_year(stands)
         draws = np.empty((len(stands), DRAWS_SIZE))
         for k, stand in enumerate(stands):
             if self._weather[stand] is None:
                 raise RuntimeError(f"stand {stand} has not been started")
             draws[k] = draw_year(self._weather[stand], self._disturbance[stand])
         rows = np.empty((len(stands), days, len(DAILY))) if daily else None
-        state, record = self._run(stands, draws, actions, observed, days, rows)
-        self._check(stands, state, record, "year")
+        state, record = self._run(stands, draws, actions, observed, days, rows, parameters=parameters)
+        self._check(stands, parameters, state, record, "year")
         self.state[stands] = state
         self.record[stands] = record
         self.years[stands] += 1
         return (record, rows) if daily else record
+
+    def parameters_of_year(self, stands) -> np.ndarray:
+        """`parameters` of stands (stands, fields), with what a scenario makes of the year to come."""
+        parameters = self.parameters[stands]
+        if self.scenario is not None:
+            self.scenario.check_years(int(self.years[stands].max()) + 1)
+            columns = [PARAMETER_NAMES.index(name) for name in self.scenario.names]
+            parameters[:, columns] = self.scenario.values[self.years[stands]]
+        return parameters
 
     def stocks(self, stands) -> dict[str, np.ndarray]:
         """Stems and carbon of stands now, by record name, shape (stands,); `age_classes` has shape (stands, 10)."""
@@ -256,8 +273,12 @@ class Stands:
         self._weather = [restored_generator(g) for g in state["weather"]]
         self._disturbance = [restored_generator(g) for g in state["disturbance"]]
 
-    def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None, steps_per_day=None):
-        """The new states and records of a year, without touching anything: (stands, fields) each."""
+    def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None, steps_per_day=None, parameters=None):
+        """The new states and records of a year, without touching anything: (stands, fields) each.
+
+        parameters : of the year, (stands, fields), or None for those without a scenario.
+        """
+        parameters = self.parameters[stands] if parameters is None else parameters
         state = np.empty((len(stands), STATE_SIZE))
         record = np.empty((len(stands), len(RECORD)))
 
@@ -265,7 +286,7 @@ class Stands:
             rows = None if daily is None else daily[chunk]
             state[chunk], record[chunk] = run_block(
                 self.lanes,
-                self.parameters[stands[chunk]],
+                parameters[chunk],
                 self.state[stands[chunk]],
                 draws[chunk],
                 actions[chunk],
@@ -288,11 +309,11 @@ class Stands:
             list(self._pool.map(run, chunks))
         return state, record
 
-    def _check(self, stands, state, record, what) -> None:
+    def _check(self, stands, parameters, state, record, what) -> None:
         def describe(k):
             return f"{what} {self.years[stands[k]]} of stand {stands[k]}, {self.seeds[stands[k]]}"
 
-        check_closure(state, record, self.parameters[stands], describe)
+        check_closure(state, record, parameters, describe)
 
 
 #: Stocks that spin-up leaves as they were drawn, but for dead wood, which it finds.

@@ -13,6 +13,7 @@ from sim.assortment import PRODUCTS
 from sim.demography import AGE_CLASSES, AGES
 from sim.parameters import CONSTANTS, MECHANISMS, SITE_PARAMETERS
 from sim.physical_constants import DAYS_PER_YEAR
+from sim.scenario import WITHOUT_SCENARIO
 
 DAYS = DAYS_PER_YEAR
 
@@ -264,7 +265,7 @@ deadwood_before gpp_understorey mean_deficit photons ready_conifer ready_deciduo
 """.split()
 
 
-PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS, "weather_as_observed")
+PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS, "weather_as_observed", *WITHOUT_SCENARIO)
 STATE_NAMES = tuple(STATE)
 RECORD_NAMES = tuple(RECORD)
 DAILY_NAMES = tuple(DAILY)

@@ -100,6 +100,12 @@ def daily_mean_temperature(p, day, anomaly):
     return p.mean_annual_temperature_c + p.seasonal_amplitude_c * math.cos(angle) + anomaly
 
 
+def warming(p, day):
+    """K that a scenario adds, to the day's mean after its precipitation."""
+    angle = 2.0 * math.pi * (day + 0.5 - p.warmest_day) / 365.0
+    return p.warming_k + p.warming_amplitude_k * math.cos(angle)
+
+
 def temperature_anomaly(p, day, yesterday, noise):
     """The day's departure from the season [K]; nothing is remembered from the year before."""
     spread = p.daily_noise_std_c
@@ -170,7 +176,8 @@ def generated_weather(p, day, yesterday, noise, dice, amount, windiness):
     """A day's weather from its draws; `yesterday` is the temperature anomaly of the day before."""
     anomaly = temperature_anomaly(p, day, yesterday, noise)
     mean = daily_mean_temperature(p, day, anomaly)
-    precipitation = daily_precipitation(p, day, mean, anomaly, dice, amount)
+    precipitation = p.precipitation_factor * daily_precipitation(p, day, mean, anomaly, dice, amount)
+    mean += warming(p, day)
     amplitude = diurnal_amplitude(p, day, precipitation)
     wet, quarter = "wet" if precipitation >= 1.0 else "dry", season(day)
     humidity = min(max(p.relative_humidity + getattr(p, f"humidity_{wet}_{quarter}"), 0.05), 1.0)

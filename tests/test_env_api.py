@@ -21,7 +21,7 @@ import sim
 from boreal_env import BorealEnv, BorealVectorEnv, Reward
 from sim.state import PARAMETER_NAMES
 
-IDS = ("boreal-generalist-v0", "boreal-site-specific-v0", "boreal-balanced-v0")
+IDS = ("boreal-generalist-v0", "boreal-site-specific-v0", "boreal-balanced-v0", "boreal-warming-v0")
 
 
 @pytest.mark.parametrize("name", IDS)

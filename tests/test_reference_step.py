@@ -83,7 +83,9 @@ def draw_parameters(generator, limits, how):
         if all(p[low] < p[high] for low, high in ORDERED_CONSTANTS):
             break
     switches = {name: float(generator.random() > 0.1) for name in MECHANISMS}
-    return SimpleNamespace(**p, **switches, weather_as_observed=float(generator.random() > 0.5))
+    as_observed = float(generator.random() > 0.5)
+    scenario = {"warming_k": 2.0, "warming_amplitude_k": -0.5, "precipitation_factor": 1.1}
+    return SimpleNamespace(**p, **switches, weather_as_observed=as_observed, **scenario)
 
 
 def season_of(p, day):

@@ -62,6 +62,7 @@ class Episodes:
         weather="paper",
         boundary="sampled",
         soil_carbon="drawn",
+        scenario=None,
         observation_groups=None,
         record_years=False,
     ):
@@ -114,10 +115,13 @@ class Episodes:
             weather=weather,
             boundary=boundary,
             soil_carbon=soil_carbon,
+            scenario=scenario,
             hwp_half_life_years=hwp_half_life_years,
             harvest_min_class=harvest_min_class,
             threads=threads,
         )
+        if self.stands.scenario is not None:
+            self.stands.scenario.check_years(self.years)
         self.table = Table(observation_rows(self.objective_names))
         self.masks = MaskFunction(self.table.names, harvest_min_class)
         rows = self.table.rows

@@ -1,0 +1,108 @@
+"""Climate change: what each year has on top of the site's own climate, and its carbon dioxide.
+
+`scenarios.csv` has three paths of boreal land, against 1995-2014; `analysis/make_scenarios.py` writes it and has the
+sources. A stand's first year is `FIRST_YEAR`; what comes before it, spin-up included, is without a path.
+"""
+
+import csv
+from collections.abc import Mapping
+from importlib.resources import files
+
+import numpy as np
+
+from sim.parameters import CONSTANTS
+
+FIRST_YEAR = 2025
+TABLE = "scenarios.csv"
+CO2 = "co2_ppm"
+
+#: What the weather generator adds, as parameters, where no path says otherwise.
+WITHOUT_SCENARIO = {"warming_k": 0.0, "warming_amplitude_k": 0.0, "precipitation_factor": 1.0}
+
+#: What a path can have: column -> (lowest and highest value allowed, unit).
+COLUMNS = {
+    "warming_k": (-10.0, 15.0, "K"),
+    "warming_amplitude_k": (-10.0, 10.0, "K"),
+    "precipitation_factor": (0.0, 3.0, "(1: as without)"),
+    CO2: (CONSTANTS[CO2].physical_low, CONSTANTS[CO2].physical_high, "ppm"),
+}
+
+
+def _read() -> dict[str, dict[str, list]]:
+    lines = (files("sim") / TABLE).read_text(encoding="utf-8").splitlines()
+    paths: dict[str, dict[str, list]] = {}
+    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
+        path = paths.setdefault(row["scenario"], {name: [] for name in ("year", *COLUMNS)})
+        for name, values in path.items():
+            values.append(int(row[name]) if name == "year" else float(row[name]))
+    return paths
+
+
+#: Name -> columns of `scenarios.csv`, `year` among them.
+SCENARIOS = _read()
+
+
+class Path:
+    """A checked path: its `names`, and their `values` by year, shape (years, names); the first is a stand's first."""
+
+    def __init__(self, columns: dict[str, np.ndarray], until: str):
+        self.names = tuple(columns)
+        self.values = np.column_stack(list(columns.values()))
+        self.until = until
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def check_years(self, years: int) -> None:
+        """Refuse to go on for more years than the path has."""
+        if years > len(self):
+            raise ValueError(f"years = {years}: the scenario {self.until}, so at most {len(self)} are allowed")
+
+
+def check_scenario(scenario) -> Path | None:
+    """A name of `SCENARIOS`, or a path of the user's, checked; None for none.
+
+    A path is a dict or a DataFrame of one or more of `COLUMNS`, each with a value for every year from the stand's first
+    on, as a sequence or as a dict by year. Raises ValueError naming the value and what is allowed.
+    """
+    if scenario is None:
+        return None
+    if isinstance(scenario, str) and scenario in SCENARIOS:
+        table = SCENARIOS[scenario]
+        first = table["year"].index(FIRST_YEAR)
+        columns = {name: np.array(table[name][first:]) for name in COLUMNS}
+        return Path(columns, f"{scenario} is from {FIRST_YEAR} to {table['year'][-1]}")
+    if not isinstance(scenario, Mapping) and not hasattr(scenario, "columns"):
+        named = ", ".join(SCENARIOS)
+        raise ValueError(f"scenario {scenario!r}: allowed are None, {named}, or a dict or DataFrame of a path by year")
+    columns = {}
+    for name in scenario:
+        if name not in COLUMNS:
+            raise ValueError(f"unknown column {name!r} of the scenario; allowed: {', '.join(COLUMNS)}")
+        columns[name] = _check_column(name, scenario[name])
+    if not columns:
+        raise ValueError(f"the scenario has no column; allowed: {', '.join(COLUMNS)}")
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"the scenario's columns are not equally long: {lengths}")
+    return Path(columns, f"has {lengths.popitem()[1]} years")
+
+
+def _check_column(name: str, values) -> np.ndarray:
+    if isinstance(values, Mapping):
+        years = list(values)
+        if not all(isinstance(year, (int, np.integer)) for year in years) or (np.diff(years) != 1).any():
+            raise ValueError(f"scenario {name}: its years have to follow each other, got {years[:3]}..")
+        values = list(values.values())
+    try:
+        numbers = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"scenario {name}: a number for each year is allowed, got {values!r}") from None
+    if numbers.ndim != 1 or not len(numbers):
+        raise ValueError(f"scenario {name}: a number for each year is allowed, got {values!r}")
+    low, high, unit = COLUMNS[name]
+    wrong = ~((numbers >= low) & (numbers <= high))
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise ValueError(f"scenario {name} = {numbers[k]:g} in year {k + 1}: [{low:g}, {high:g}] {unit} is allowed")
+    return numbers

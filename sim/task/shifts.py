@@ -1,0 +1,27 @@
+"""Sites outside the range that is sampled: how far a policy generalises, by one property at a time."""
+
+from sim.spin_up import BOUNDARY
+from sim.task.checks import check_choice
+
+INSIDE = "inside"
+
+#: Shift -> range of site parameters, beside the sampled one (`sim/site_parameters.csv`); all else is the site's own.
+SHIFTS = {
+    "warmer_boundary": {BOUNDARY: (272.0, 274.0)},
+    "warmer_air": {"mean_annual_temperature_c": (-5.0, -3.0)},
+    "further_north": {"latitude_deg": (65.0, 69.0), "mean_annual_temperature_c": (-12.0, -10.0)},
+    "calmer": {"wind_speed_m_s": (0.4, 1.0)},
+    "less_snow": {"winter_snow_prob": (0.05, 0.15), "winter_snow_mm_day": (1.0, 3.0)},
+}
+
+
+def shifts_of(boundary: str = "sampled") -> tuple[str, ...]:
+    """Shifts of a world: a boundary in balance is found, not given, so warmer air takes its place there."""
+    left_out = "warmer_boundary" if boundary == "balanced" else "warmer_air"
+    return tuple(name for name in SHIFTS if name != left_out)
+
+
+def shifted(name: str, boundary: str = "sampled") -> dict:
+    """Arguments of an environment for a shift, none for `INSIDE`: the same site seeds then give the shifted sites."""
+    check_choice("shift", name, (INSIDE, *shifts_of(boundary)))
+    return {} if name == INSIDE else {"parameter_overrides": dict(SHIFTS[name])}

@@ -1,0 +1,109 @@
+"""Shifted sites, and the ratios by which a policy generalises, on cases worked by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from playing import quick
+
+import sim
+from analysis import generalisation
+from sim.task.episodes import BALANCED_WORLD
+from sim.task.shifts import INSIDE, SHIFTS, shifted, shifts_of
+
+
+def table(seed, *points):
+    return pd.DataFrame(points, columns=["carbon_return", "thaw_return"]).assign(site_seed=seed)
+
+
+# ------------------------------------------------------------------------------------------------- shifted sites
+
+
+def test_shifts_lie_beside_the_sampled_range_and_within_physical_limits():
+    for shift in SHIFTS.values():
+        for name, (low, high) in shift.items():
+            parameter = sim.SITE_PARAMETERS[name]
+            assert parameter.physical_low <= low < high <= parameter.physical_high
+            assert high <= parameter.low or parameter.high <= low
+
+
+@pytest.mark.parametrize("boundary", ["sampled", "balanced"])
+def test_a_shifted_environment_has_the_same_sites_but_for_the_shift(boundary):
+    world = {**BALANCED_WORLD, "boundary": boundary}
+    names = shifts_of(boundary)
+    assert len(names) == 4
+    for name in (INSIDE, *names):
+        env = quick(years=1, **world, **shifted(name, boundary))
+        env.reset(seed=7)
+        site_seed = int(env._episodes.site_seeds[0])
+        moved = sim.sample_site(site_seed, SHIFTS.get(name))
+        differs = {key for key, value in sim.sample_site(site_seed).items() if moved[key] != value}
+        assert differs == set(SHIFTS.get(name, {}))
+        found = dict(zip(sim.state.PARAMETER_NAMES, env._episodes.stands.parameters[0], strict=True))
+        assert all(found[key] == moved[key] for key in differs)
+
+
+def test_a_shift_that_a_world_does_not_have():
+    with pytest.raises(ValueError, match=r"shift 'warmer_boundary': allowed are inside, warmer_air, further_north"):
+        shifted("warmer_boundary", "balanced")
+    with pytest.raises(ValueError, match=r"shift 'hotter': allowed are inside, warmer_boundary"):
+        shifted("hotter")
+
+
+# ------------------------------------------------------------------------------------------------------- ratios
+
+
+def test_ratios_by_hand():
+    """The best front scaled is (0, 1), (1, 0), (0.8, 0.8), of hypervolume 0.64; the policy's point (0.5, 0.5), 0.25."""
+    best = table(1, (-2.0, 3.0), (8.0, -7.0), (6.0, 1.0))
+    found = generalisation.ratios({"mine": table(1, (3.0, -2.0))}, best).iloc[0]
+    assert found.nhgr == pytest.approx(0.25 / 0.64)
+    weights = np.linspace(0.0, 1.0, 50)
+    known = np.maximum(np.maximum(weights, 1.0 - weights), 0.8).mean()
+    assert found.eugr == pytest.approx(0.5 / known)
+
+
+def test_the_best_front_itself_has_all_and_better_than_it_no_more():
+    best = table(1, (0.0, 1.0), (1.0, 0.0), (0.6, 0.6))
+    better = table(1, (2.0, 2.0))
+    found = generalisation.ratios({"same": best, "better": better}, best).set_index("policy")
+    assert found.nhgr["better"] == found.eugr["better"] == 1.0
+    assert found.nhgr["same"] == found.eugr["same"] == pytest.approx(1.0)
+
+
+def test_ratios_hang_on_no_offset_or_unit():
+    best, mine = table(1, (0.0, 1.0), (1.0, 0.0), (0.7, 0.7)), table(1, (0.2, 0.9), (0.5, 0.6))
+    moved = [one.assign(carbon_return=7.0 * one.carbon_return - 100.0) for one in (best, mine)]
+    pd.testing.assert_frame_equal(
+        generalisation.ratios({"mine": mine}, best), generalisation.ratios({"mine": moved[1]}, moved[0])
+    )
+
+
+def test_fronts_are_means_by_site_and_weight():
+    rows = [(1, 0.0, 1.0, 2.0), (1, 0.0, 3.0, 4.0), (1, 1.0, 5.0, 6.0), (2, 0.0, 7.0, 8.0)]
+    evaluation = pd.DataFrame(rows, columns=["site_seed", "preference", "carbon_return", "thaw_return"])
+    assert generalisation.fronts(evaluation).to_numpy().tolist() == [[1, 0, 2, 3], [1, 1, 5, 6], [2, 0, 7, 8]]
+
+
+def test_the_drop_is_paired_by_site():
+    inside = pd.DataFrame({"policy": "mine", "site_seed": [1, 2, 3], "nhgr": [0.9, 0.5, 0.7], "eugr": 1.0})
+    outside = pd.DataFrame({"policy": "mine", "site_seed": [3, 2, 1], "nhgr": [0.5, 0.3, 0.7], "eugr": 0.8})
+    found = generalisation.summary({"inside": inside, "calmer": outside}, "inside").set_index("split")
+    assert found.nhgr["calmer"] == pytest.approx(0.5) and found.nhgr["inside"] == pytest.approx(0.7)
+    drop = found.loc["calmer"]
+    assert (drop.nhgr_drop, drop.nhgr_drop_low, drop.nhgr_drop_high) == pytest.approx((0.2, 0.2, 0.2))
+    assert drop.eugr_drop == pytest.approx(0.2) and found.nhgr_drop["inside"] == 0.0
+
+
+def test_what_cannot_be_compared_is_refused():
+    best = table(1, (0.0, 1.0), (1.0, 0.0))
+    with pytest.raises(ValueError, match=r"policy mine: site 1 has not both"):
+        generalisation.ratios({"mine": table(2, (0.0, 0.0))}, best)
+    with pytest.raises(ValueError, match=r"policy mine: returns of carbon_return, thaw_return are needed"):
+        generalisation.ratios({"mine": best.drop(columns="thaw_return")}, best)
+    with pytest.raises(ValueError, match=r"evaluation: column preference is missing"):
+        generalisation.fronts(best)
+    one = pd.DataFrame({"policy": "mine", "site_seed": [1], "nhgr": 1.0, "eugr": 1.0})
+    with pytest.raises(ValueError, match=r"split 'a' has not the policies and site seeds of 'b'"):
+        generalisation.summary({"a": one.assign(site_seed=2), "b": one}, "b")
+    with pytest.raises(ValueError, match=r"split 'c': allowed are a"):
+        generalisation.summary({"a": one}, "c")
