@@ -18,7 +18,7 @@ TOY = "resumable_toy:resumable-toy-v0"
 THREE = "toy_env:toy-three-v0"
 
 
-def train(folder, *arguments, env_id=TOY, steps=320):
+def train(folder, *arguments, env_id=TOY, steps=160):
     given = ("--num-envs", 4, "--group-size", 2, "--rollout-steps", 80, "--minibatch-size", 40)
     evaluation = ("--eval-episodes", 2, "--eval-weights", *((0, 1) if env_id != THREE else (1, 0, 0, 0, 0, 1)))
     run_script(
@@ -98,7 +98,7 @@ def test_values_are_of_their_unit_and_the_loss_of_none():
 # ------------------------------------------------------------------------------------------------- script
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_learns_the_toy(seed, tmp_path):
     train(
         tmp_path,
@@ -118,8 +118,8 @@ def test_a_group_shares_dice_and_not_the_preference(env_id, tmp_path):
     train(tmp_path, env_id=env_id)
     episodes = pd.read_csv(tmp_path / "episodes.csv")
     weights = [name for name in episodes if name == "preference" or name.startswith("weight_")]
-    assert len(episodes) == 32 and len(weights) == (3 if env_id == THREE else 1)
-    assert episodes[weights].drop_duplicates().shape[0] == 32
+    assert len(episodes) == 16 and len(weights) == (3 if env_id == THREE else 1)
+    assert episodes[weights].drop_duplicates().shape[0] == 16
     if env_id == THREE:
         np.testing.assert_allclose(episodes[weights].sum(axis=1), 1)
     else:  # one in each half
@@ -129,19 +129,19 @@ def test_a_group_shares_dice_and_not_the_preference(env_id, tmp_path):
 
 
 def test_groups_share_site_start_and_weather_async_as_in_lockstep(tmp_path):
-    steps = ("--rollout-steps", 200, "--update-epochs", 1)
+    steps = ("--rollout-steps", 200, "--update-epochs", 1, "--eval-episodes", 1)
     for how in ("async", "lockstep"):
-        train(tmp_path / how, "--vectorization", how, *steps, env_id="boreal-generalist-v0", steps=600)
+        train(tmp_path / how, "--vectorization", how, *steps, env_id="boreal-generalist-v0", steps=400)
     episodes = pd.read_csv(tmp_path / "async" / "episodes.csv")
     sites = episodes.site_seed.to_numpy().reshape(-1, 2)
-    assert len(sites) == 6 and (sites[:, 0] == sites[:, 1]).all() and len(set(sites[:, 0])) == 6
+    assert len(sites) == 4 and (sites[:, 0] == sites[:, 1]).all() and len(set(sites[:, 0])) == 4
     same = ("timing.csv", "config.json", "checkpoint.pt", "summary.png")
     assert_same_bytes(tmp_path / "async", tmp_path / "lockstep", same)
 
 
-@pytest.mark.parametrize("arguments", [(), ("--group-size", 1), ("--gae-lambda", 0.9, "--rollout-steps", 48)])
+@pytest.mark.parametrize("arguments", [(), ("--group-size", 1, "--rollout-steps", 48)])
 def test_killed_and_resumed_is_as_never_killed(arguments, tmp_path, monkeypatch):
-    """Also without groups, and where rollouts cut episodes."""
+    """Also without groups where rollouts cut episodes."""
     monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 64)
     train(tmp_path / "whole", *arguments)
 
