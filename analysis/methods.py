@@ -40,6 +40,7 @@ ROWS = (
     Method("eupg_var_lambda", "Variable λ EUPG", CONDITIONED, "#CC79A7", "s", "eupg_variable_lambda"),
     Method("ppo_gated", "PPO Gated", CONDITIONED, "#009E73", "^", "ppo_gated"),
     Method("ppo_curriculum", "Curriculum PPO", CONDITIONED, "#D55E00", "o", "curriculum_ppo"),
+    Method("ppo_group", "Group PPO", CONDITIONED, "#F0E442", "P"),
     Method("eupg_fixed_lambda", "Fixed λ EUPG", FIXED_WEIGHT, "#0072B2", "D", "fixed_weight_eupg"),
 )
 METHODS = {method.script: method for method in ROWS}

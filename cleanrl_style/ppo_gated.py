@@ -11,7 +11,6 @@ import numpy as np
 import torch
 import torch.nn as nn
 import torch.optim as optim
-from torch.distributions.categorical import Categorical
 
 from cleanrl_style import protocol
 
@@ -108,32 +107,30 @@ class Agent(nn.Module):
             nn.Tanh(),
             layer_init(nn.Linear(64, 64)),
             nn.Tanh(),
+            layer_init(nn.Linear(64, 2 + 15 + 10), std=0.01),  # gate, head of other actions, head of planting
         )
-        self.gate = layer_init(nn.Linear(64, 2), std=0.01)
-        self.other_head = layer_init(nn.Linear(64, 15), std=0.01)
-        self.plant_head = layer_init(nn.Linear(64, 10), std=0.01)
 
     def get_value(self, x):
         return self.critic(x)
 
-    def get_distribution(self, x, mask):
-        """x (n, observation), mask (n, 25) bool, at least one action valid in each row."""
-        hidden = self.actor(x)
-        other_mask, plant_mask = mask[:, :15], mask[:, 15:]
-        group_mask = torch.stack([other_mask.any(dim=1), plant_mask.any(dim=1)], dim=1)
-        # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in a group without a valid action
-        gate = torch.where(group_mask, self.gate(hidden), -1e8).log_softmax(dim=1)
-        other = torch.where(other_mask, self.other_head(hidden), -1e8).log_softmax(dim=1)
-        plant = torch.where(plant_mask, self.plant_head(hidden), -1e8).log_softmax(dim=1)
-        logits = torch.cat([gate[:, :1] + other, gate[:, 1:] + plant], dim=1)
-        # its checks would take a quarter of an update; what is no number cannot be sampled from either
-        return Categorical(logits=logits, validate_args=False)
+    def get_logprobs(self, x, mask):
+        """Logarithm of each action's probability (n, 25) for x (n, observation) and mask (n, 25) bool.
+
+        At least one action is valid in each row. Written out, since torch's Categorical takes longer than its networks.
+        """
+        sides = torch.stack([mask[:, :15].any(dim=1), mask[:, 15:].any(dim=1)], dim=1)
+        # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in a side without a valid action
+        logits = torch.where(torch.cat([sides, mask], dim=1), self.actor(x), -1e8)
+        gate, other, plant = (part.log_softmax(dim=1) for part in logits.split([2, 15, 10], dim=1))
+        return torch.cat([gate[:, :1] + other, gate[:, 1:] + plant], dim=1)
 
     def get_action_and_value(self, x, mask, action=None):
-        distribution = self.get_distribution(x, mask)
+        logprobs = self.get_logprobs(x, mask)
+        probs = logprobs.exp()
         if action is None:
-            action = distribution.sample()
-        return action, distribution.log_prob(action), distribution.entropy(), self.critic(x)
+            action = probs.multinomial(1).squeeze(1)
+        logprob = logprobs.gather(1, action[:, None]).squeeze(1)
+        return action, logprob, -(probs * logprobs).sum(dim=1), self.critic(x)
 
 
 def make_policy(agent):
@@ -141,8 +138,7 @@ def make_policy(agent):
 
     def action_probabilities(observations, masks, accrued_returns):
         with torch.no_grad():
-            distribution = agent.get_distribution(torch.from_numpy(observations), torch.from_numpy(masks))
-        return distribution.probs.numpy()
+            return agent.get_logprobs(torch.from_numpy(observations), torch.from_numpy(masks)).exp().numpy()
 
     return action_probabilities
 
@@ -226,7 +222,8 @@ if __name__ == "__main__":
 
         num_values = task.num_objectives if args.per_objective_advantages else 1  # of the scalarised reward
         agent = Agent(envs, num_values)
-        optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+        parameters = protocol.flat_parameters(agent)
+        optimizer = optim.Adam([parameters], lr=args.learning_rate, eps=1e-5, fused=True)
 
         # TRY NOT TO MODIFY: start the game
         first_iteration, global_step, episode = 1, 0, 0
@@ -327,29 +324,20 @@ if __name__ == "__main__":
                 b_advantages = weigh_advantages(b_advantages, weights.flatten(0, 1), b_inds)
             b_advantages = b_advantages.flatten()
             num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
+            batch = (b_obs, b_masks, b_actions, b_logprobs, b_advantages, b_returns, b_values)
             losses = []
             y_pred, y_true = b_values[b_inds], b_returns[b_inds]
             for epoch in range(args.update_epochs):
                 np.random.shuffle(b_inds)
+                shuffled = [part[b_inds] for part in batch]
                 for minibatch in range(num_minibatches):
-                    mb_inds = b_inds[minibatch::num_minibatches]
-                    parts = ppo_losses(
-                        agent,
-                        b_obs[mb_inds],
-                        b_masks[mb_inds],
-                        b_actions[mb_inds],
-                        b_logprobs[mb_inds],
-                        b_advantages[mb_inds],
-                        b_returns[mb_inds],
-                        b_values[mb_inds],
-                        args,
-                    )
+                    parts = ppo_losses(agent, *(part[minibatch::num_minibatches] for part in shuffled), args)
                     pg_loss, v_loss, entropy = parts[:3]
                     loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
 
-                    optimizer.zero_grad()
+                    optimizer.zero_grad(set_to_none=False)
                     loss.backward()
-                    nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
+                    nn.utils.clip_grad_norm_(parameters, args.max_grad_norm)
                     optimizer.step()
                     losses.append(torch.stack(parts).detach().numpy())
 

@@ -24,7 +24,7 @@ def test_the_followed_example(tmp_path):
         script = script.replace(old, new)
         changed += sum(line[0] in "-+" for line in hunk.split("\n"))
     assert f"says {changed}:" in PAGE
-    path = tmp_path / "ppo_group.py"
+    path = tmp_path / "ppo_neighbours.py"
     path.write_text(script, encoding="utf-8")
     run_script(
         path,

@@ -62,12 +62,12 @@ def test_joint_probabilities_are_gate_times_head_and_sum_to_one():
     agent = make_agent()
     x, mask = torch.randn(6, OBSERVATIONS), torch.rand(6, 25) < 0.5
     mask[:, 12] = mask[:, 20] = True
-    probabilities = agent.get_distribution(x, mask).probs.detach()
+    probabilities = agent.get_logprobs(x, mask).exp().detach()
     torch.testing.assert_close(probabilities.sum(dim=1), torch.ones(6))
     assert (probabilities[~mask] == 0).all()
-    hidden = agent.actor(x)
-    gate = agent.gate(hidden).softmax(dim=1)
-    heads = [agent.other_head(hidden).exp() * mask[:, :15], agent.plant_head(hidden).exp() * mask[:, 15:]]
+    gate, other, plant = agent.actor(x).split([2, 15, 10], dim=1)
+    gate = gate.softmax(dim=1)
+    heads = [other.exp() * mask[:, :15], plant.exp() * mask[:, 15:]]
     expected = [gate[:, [k]] * head / head.sum(dim=1, keepdim=True) for k, head in enumerate(heads)]
     torch.testing.assert_close(probabilities, torch.cat(expected, dim=1).detach())
 
@@ -78,7 +78,7 @@ def test_a_group_without_a_valid_action_leaves_all_to_the_other(valid):
     mask = torch.zeros(3, 25, dtype=torch.bool)
     mask[:, valid] = True
     action, logprob, entropy, _ = agent.get_action_and_value(torch.randn(3, OBSERVATIONS), mask)
-    probabilities = agent.get_distribution(torch.randn(3, OBSERVATIONS), mask).probs
+    probabilities = agent.get_logprobs(torch.randn(3, OBSERVATIONS), mask).exp()
     torch.testing.assert_close(probabilities[:, valid].sum(dim=1), torch.ones(3))
     assert mask.gather(1, action[:, None]).all()
     assert torch.isfinite(logprob).all() and torch.isfinite(entropy).all()
@@ -90,9 +90,8 @@ def test_masked_actions_give_no_gradient():
     mask[:, 15:] = False
     _, logprob, entropy, _ = agent.get_action_and_value(torch.randn(1, OBSERVATIONS), mask, torch.tensor([3]))
     (logprob + entropy).sum().backward()
-    assert not agent.plant_head.weight.grad.any()
-    assert not agent.gate.weight.grad.any()
-    assert agent.other_head.weight.grad.any()
+    gate, other, plant = agent.actor[4].weight.grad.split([2, 15, 10])
+    assert not plant.any() and not gate.any() and other.any()
 
 
 def test_gae_of_a_hand_computed_episode():

@@ -38,10 +38,11 @@ def numpy_losses(agent, x, mask, action, old_logprob, advantage, target, old_val
         advantage = (advantage - advantage.mean()) / (advantage.std(ddof=1) + 1e-8)
     for i in range(len(x)):
         hidden = layers("actor", x[i])
-        plant_or_not = np.exp(w["gate.weight"] @ hidden + w["gate.bias"]) * [mask[i, :15].any(), mask[i, 15:].any()]
+        odds_of_all = np.exp(w["actor.4.weight"] @ hidden + w["actor.4.bias"])
+        plant_or_not = odds_of_all[:2] * [mask[i, :15].any(), mask[i, 15:].any()]
         probabilities = []
-        for k, (head, part) in enumerate((("other_head", slice(0, 15)), ("plant_head", slice(15, 25)))):
-            odds = np.exp(w[f"{head}.weight"] @ hidden + w[f"{head}.bias"]) * mask[i, part]
+        for k, part in enumerate((slice(0, 15), slice(15, 25))):
+            odds = odds_of_all[2:][part] * mask[i, part]
             probabilities += list(plant_or_not[k] / plant_or_not.sum() * odds / max(odds.sum(), 1e-300))
         ratio = probabilities[action[i]] / np.exp(old_logprob[i])
         policy.append(-min(ratio * advantage[i], np.clip(ratio, 1 - clip, 1 + clip) * advantage[i]))
@@ -59,8 +60,7 @@ def numpy_losses(agent, x, mask, action, old_logprob, advantage, target, old_val
 def test_losses_and_their_gradient_are_those_of_an_independent_implementation(norm_adv, clip_vloss):
     agent = make_agent().double()
     with torch.no_grad():
-        for head in (agent.gate, agent.other_head, agent.plant_head):
-            head.weight *= 50  # far from uniform: ratios beyond the clip
+        agent.actor[4].weight *= 50  # far from uniform: ratios beyond the clip
     generator = np.random.default_rng(0)
     n = 16
     x, mask = generator.normal(size=(n, OBSERVATIONS)), generator.random((n, 25)) < 0.5
@@ -81,7 +81,7 @@ def test_losses_and_their_gradient_are_those_of_an_independent_implementation(no
     assert 0.2 < clip_fraction < 0.8
 
     (pg_loss + v_loss + entropy).backward()
-    for parameter in (agent.gate.weight, agent.plant_head.bias, agent.actor[0].weight, agent.critic[4].weight):
+    for parameter in (agent.actor[4].weight, agent.actor[4].bias, agent.actor[0].weight, agent.critic[4].weight):
         flat, h = parameter.detach().view(-1), 1e-6
         k = int(parameter.grad.abs().argmax())
         sums = []

@@ -10,6 +10,7 @@ from cleanrl_style.protocol.arguments import LIMITS, MAX_ENVS, fail, make_task, 
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.evaluation import FIRST_EVALUATION_SEED, POLICIES, evaluate
 from cleanrl_style.protocol.files import replacing
+from cleanrl_style.protocol.flat import flat_parameters
 from cleanrl_style.protocol.fronts import scalarize
 from cleanrl_style.protocol.progress import Progress
 from cleanrl_style.protocol.run_folder import FLOAT_FORMAT, TIMING_COLUMNS, Run
@@ -31,6 +32,7 @@ __all__ = [
     "evaluate",
     "fail",
     "final_info",
+    "flat_parameters",
     "load_agent",
     "make_task",
     "not_default",

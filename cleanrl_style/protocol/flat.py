@@ -1,0 +1,17 @@
+"""A network's parameters as one: clipping and Adam take one tensor, not each of a dozen small ones in turn."""
+
+
+def flat_parameters(network):
+    """One parameter that holds all of the network's, which become parts of it, as their gradients of its own.
+
+    The gradient has to be set to zero, not to None: `optimizer.zero_grad(set_to_none=False)`.
+    """
+    import torch  # only here: the heuristics do without
+
+    parameters = list(network.parameters())
+    sizes = [parameter.numel() for parameter in parameters]
+    flat = torch.nn.Parameter(torch.cat([parameter.detach().flatten() for parameter in parameters]))
+    flat.grad = torch.zeros_like(flat)
+    for parameter, data, gradient in zip(parameters, flat.detach().split(sizes), flat.grad.split(sizes), strict=True):
+        parameter.data, parameter.grad = data.view_as(parameter), gradient.view_as(parameter)
+    return flat
