@@ -95,9 +95,9 @@ def test_the_policy_sees_the_accrued_returns():
         return optimal(observations, masks, accrued_returns)
 
     episodes, _ = evaluate(policy, eval_weights=(1.0,), eval_episodes=2)
-    assert len(seen) == 2 * LENGTH
-    for step, accrued in enumerate(seen[:LENGTH]):
-        np.testing.assert_allclose(accrued, [[step, 0]] * 2)
+    assert len(seen) == LENGTH  # both policies side by side
+    for step, accrued in enumerate(seen):
+        np.testing.assert_allclose(accrued, [[step, 0]] * 4)
 
 
 def test_sampling_follows_the_probabilities():

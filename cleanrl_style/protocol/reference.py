@@ -7,6 +7,7 @@ episodes, of another environment or another physics are measured when they are f
 
 import ast
 import contextlib
+import functools
 import gzip
 import hashlib
 import io
@@ -50,14 +51,19 @@ def title(plan: str) -> str:
 def fingerprint(task: Task) -> str:
     """Hash of all that a plan's returns depend on: environment, its arguments, source and tables of the simulator."""
     arguments = {name: value for name, value in task.env_kwargs.items() if name != "observation_groups"}
-    digest = hashlib.sha256(repr((task.env_id, sorted(arguments.items()))).encode())
-    simulator = files("sim")
-    sources = [Path(boreal_env.__file__), *sorted(Path(str(simulator)).rglob("*.py"))]
-    for path in sources:
+    of_all = (source(), task.env_id, sorted(arguments.items()))
+    return hashlib.sha256(repr(of_all).encode()).hexdigest()[:16]
+
+
+@functools.cache
+def source() -> str:
+    """Hash of source and tables of simulator and environment."""
+    simulator, digest = Path(str(files("sim"))), hashlib.sha256()
+    for path in [Path(boreal_env.__file__), *sorted(simulator.rglob("*.py"))]:
         digest.update(bare(path.read_text(encoding="utf-8")).encode())
-    for path in sorted(Path(str(simulator)).rglob("*.csv")):
+    for path in sorted(simulator.rglob("*.csv")):
         digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    return digest.hexdigest()
 
 
 def bare(source: str) -> str:

@@ -55,42 +55,44 @@ def print_score(objectives, comparison: Comparison) -> None:
     def row(name, values, words=""):
         return f"{name:>{label}}" + "".join(f"{value:>{WIDTH}.2f}" for value in values) + words
 
-    sites = comparison.evaluation.seed.nunique()
-    print(f"\nGain over doing nothing, mean over {sites} evaluation episodes of what 50 years earn")
-    whose = objectives[0] if len(objectives) == 2 else "weights: " + ", ".join(objectives)
+    episodes = comparison.evaluation.seed.nunique()
+    scores = {name: f"{comparison.score(name):.0f}" for name in shown}
+    policies = ", ".join(f"{scores[policy]} {policy}" for policy in sorted(POLICIES, key=lambda name: name != PRIMARY))
+    print(f"\nSCORE {policies}: 0 is to do nothing, 100 the best that one can do without looking")
+    print(f"\nGain: reward of an episode above that of doing nothing, mean of {episodes} evaluation episodes")
+    whose = objectives[0] if len(objectives) == 2 else ""
     if len(objectives) > 2:
-        print(whose)
-    first, second = ("agent", "agent", "100 stems", "best"), (*POLICIES, "a year", "constant")
-    print(
-        f"{whose if len(objectives) == 2 else '':{label}}" + "".join(f"{word:>{WIDTH}}" for word in first) + "  which"
-    )
-    print(f"{'weight':>{label}}" + "".join(f"{word:>{WIDTH}}" for word in second) + "  plan that is")
+        print(f"weights of {', '.join(objectives)}")
+    heads = (whose, "agent,", "agent,", "100 stems", "best"), ("weight", *POLICIES, "a year", "constant")
+    for (first, *others), words in zip(heads, ("", "  plan, which is to"), strict=True):
+        print(f"{first:>{label}}" + "".join(f"{head:>{WIDTH}}" for head in others) + words)
     for (key, values), plan, wanted in zip(table[shown].iterrows(), comparison.best_plans, chosen, strict=True):
         if wanted:
             name = "".join(f"{w:6.2f}" for w in (key if isinstance(key, tuple) else (key,)))
             print(row(name, values, f"  {title(plan)}"))
     print(row("mean", table[shown].mean()))
-    print(f"{'SCORE':>{label}}" + "".join(f"{comparison.score(name):>{WIDTH}.0f}" for name in shown))
-    print("score: 0 is to do nothing, 100 the best that one can do without looking (the best plan of each weight)")
+    print(
+        f"{'SCORE':>{label}}" + "".join(f"{value:>{WIDTH}}" for value in scores.values()) + "  % of the best constant"
+    )
     if len(table) > 1:
         print(followed(objectives, comparison))
     hypervolumes = (f"{name} {gain_hypervolume(comparison.gains[name]):.2f}" for name in POLICIES)
     print(
-        f"gain hypervolume above doing nothing: {', '.join(hypervolumes)}, "
+        f"Hypervolume of the mean gains: {', '.join(hypervolumes)}; "
         f"best constant plans {gain_hypervolume(comparison.gains['best']):.2f}\n"
     )
 
 
 def followed(objectives, comparison: Comparison) -> str:
-    """How far the greedy policy follows the preference, and how far the best constant plans do."""
-    ends = f"{objectives[0]} weight {comparison.weights[0, 0]:g} to {comparison.weights[-1, 0]:g}"
-    what = ends if len(objectives) == 2 else "each objective's own weight from lowest to highest"
-
-    def changes(name):
-        pairs = zip(objectives, change(comparison.gains[name]), strict=True)
-        return ", ".join(f"{objective} {value:+.2f}" for objective, value in pairs)
-
-    return f"following the preference, {what}: {changes(PRIMARY)} ({PRIMARY}); best constant plans {changes('best')}"
+    """How far the primary policy follows the preference, and how far the best constant plans do."""
+    first, last = comparison.weights[[0, -1], 0]
+    what = f"{objectives[0]} weight {first:g} to {last:g}" if len(objectives) == 2 else "own weight lowest to highest"
+    ours, best = (change(comparison.gains[name]) for name in (PRIMARY, "best"))
+    changes = (
+        f"{objective} {one:+.2f} (best plans {other:+.2f})"
+        for objective, one, other in zip(objectives, ours, best, strict=True)
+    )
+    return f"Following the preference, {what}: {', '.join(changes)}"
 
 
 def draw_summary(
