@@ -69,6 +69,14 @@ def test_results_do_not_depend_on_the_chunks(monkeypatch):
     pd.testing.assert_frame_equal(whole, evaluate(uniform)[0])
 
 
+@pytest.mark.parametrize("number", [1, 2, 128, 129, 130, 2000, 4200])
+def test_chunks_are_of_one_size(number):
+    chunks = evaluation.chunks(number)
+    assert [k for chunk in chunks for k in chunk] == list(range(number))
+    sizes = [len(chunk) for chunk in chunks]
+    assert max(sizes) <= evaluation.CHUNK and min(sizes) > 0.7 * max(sizes)
+
+
 def test_a_sampled_policy_is_reproducible_and_not_greedy():
     episodes, _ = evaluate(uniform)
     pd.testing.assert_frame_equal(episodes, evaluate(uniform)[0])

@@ -1,6 +1,7 @@
 """The evaluation protocol: every method on the same episodes, every weight on the same sites and weathers."""
 
 import contextlib
+import math
 
 import gymnasium as gym
 import numpy as np
@@ -130,9 +131,14 @@ def lanes_of_evaluation(task: Task, weights: int, episodes: int, policies=POLICI
 
 
 def lanes_of(task: Task, number: int) -> set[int]:
-    """Lanes of the kernels that so many episodes need, played in chunks."""
-    stands = {size for size in (min(number, CHUNK), number % CHUNK) if size}
-    return {lanes_for(size if task.has_lockstep else 1, available_cores()) for size in stands}
+    """Lanes of the kernels that so many episodes need."""
+    return {lanes_for(len(chunk) if task.has_lockstep else 1, available_cores()) for chunk in chunks(number)}
+
+
+def chunks(number: int) -> list[range]:
+    """Episodes that are stepped in one call each: all of nearly the same size, so that one kernel does."""
+    size = math.ceil(number / math.ceil(number / CHUNK))
+    return [range(first, min(first + size, number)) for first in range(0, number, size)]
 
 
 def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, split: str = "test"):
@@ -160,8 +166,8 @@ def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, spli
     ]
     progress = Progress("evaluation", len(jobs), "episodes")
     rows, records = {}, {(kind, k): [] for kind in policies for k in range(len(weights))}
-    for start in range(0, len(jobs), CHUNK):
-        chunk = jobs[start : start + CHUNK]
+    for part in chunks(len(jobs)):
+        chunk = [jobs[number] for number in part]
         its_weights = np.array([weights[k] for _, k, _ in chunk])
         its_seeds = [seeds[episode] for *_, episode in chunk]
         greedy = np.array([kind == "greedy" for kind, *_ in chunk])

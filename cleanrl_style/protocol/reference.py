@@ -21,7 +21,7 @@ import pandas as pd
 
 import boreal_env
 from cleanrl_style.protocol.compilation import compile_physics
-from cleanrl_style.protocol.evaluation import CHUNK, lanes_of, make_envs, play
+from cleanrl_style.protocol.evaluation import chunks, lanes_of, make_envs, play
 from cleanrl_style.protocol.files import replacing
 from cleanrl_style.protocol.fronts import return_columns
 from cleanrl_style.protocol.progress import Progress
@@ -158,8 +158,8 @@ def measure(task: Task, seeds: list[int]) -> pd.DataFrame:
     jobs = [(plan, seed) for seed in seeds for plan in PLANS]
     compile_physics(lanes_of(task, len(jobs)))
     progress, returns = Progress("constant plans", len(jobs), "episodes"), []
-    for start in range(0, len(jobs), CHUNK):
-        chunk = jobs[start : start + CHUNK]
+    for numbers in chunks(len(jobs)):
+        chunk = [jobs[number] for number in numbers]
         actions = np.array([int(plan) for plan, _ in chunk])
         weights = np.full((len(chunk), task.num_objectives), 1 / task.num_objectives)
 
@@ -170,7 +170,7 @@ def measure(task: Task, seeds: list[int]) -> pd.DataFrame:
         with contextlib.closing(make_envs(task, len(chunk))) as envs:
             greedy = np.ones(len(chunk), dtype=bool)
             returns.append(play(task, envs, policy, weights, [seed for _, seed in chunk], greedy)[0])
-        progress.show(start + len(chunk))
+        progress.show(numbers.stop)
     table = pd.DataFrame(jobs, columns=["plan", "seed"])
     table[return_columns(task.objectives)] = np.concatenate(returns)
     return parse(as_text(table))  # the same digits, stored or not
