@@ -283,7 +283,7 @@ def test_gains_need_zero_change_on_the_same_episodes(tmp_path, capsys):
 
 
 def test_the_score_of_both_policies(tmp_path, monkeypatch):
-    """Best constant plans gain 4 at weight 0 and 2 at weight 1; the mean of 0, 0.5, 1 is 3 (one plan at 0 and at 0.5)."""
+    """Best constant plans: 4, 2 and 2 of weights 0, 0.5 and 1."""
     zero = dict(carbon=(0, 0, 0), thaw=(0, 0, 0))
     write_run(tmp_path / "runs" / "zero", "zero_change", **zero, vectorization="lockstep")
     for seed in (1, 2):
