@@ -302,7 +302,7 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
             "update": update,
         }
         year = took["evaluation"] / played
-        evaluated = 100 * len(protocol.POLICIES) * len(fronts.evaluation_weights(2)) * boreal_env.DEFAULT_YEARS
+        evaluated = 200 * len(protocol.POLICIES) * len(fronts.evaluation_weights(2)) * boreal_env.DEFAULT_YEARS
         whole = (300_000 * sum(step.values()) + evaluated * year) / 60_000.0
         return {
             (f"{kind}, 300,000 steps with evaluation", "min"): whole,

@@ -30,11 +30,17 @@ PAGES = (
 SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
 ENDS = (0.0, 1.0)  # weights
 HEADING = (
-    "| {what} | seeds | carbon, weight 0 | weight 1 | thaw, weight 0 | weight 1 | scalarised | scalarised gain "
-    "| gain hypervolume | scalarised, the paper |\n|---|---|---|---|---|---|---|---|---|---|\n"
+    "| {what} | seeds | score, greedy | score, sampled | gain | gain hypervolume "
+    "| carbon, weight 0 | weight 1 | thaw, weight 0 | weight 1 | scalarised | scalarised, the paper |\n"
+    + "|---" * 12
+    + "|\n"
 )
 NOT_COMPARED = ("--thaw-formulation", "--total-timesteps", "--site-seed")  # rows of other rewards, budgets, sites
-COLUMNS = ("carbon_0", "carbon_1", "thaw_0", "thaw_1", "scalarized", "gain_scalarized", "gain_hypervolume")
+RETURNS = ("carbon_0", "carbon_1", "thaw_0", "thaw_1", "scalarized")
+COLUMNS = {"score_greedy": 0, "score_sampled": 0, "gain_scalarized": 2, "gain_hypervolume": 2} | dict.fromkeys(
+    RETURNS, 2
+)
+"""Columns, and their decimals."""
 
 
 @dataclass
@@ -56,17 +62,18 @@ def numbers(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
         for weight in ENDS
     }
     row |= main_results.front_metrics(evaluation)
-    return row if gains is None else row | main_results.front_metrics(gains, "gain_")
+    return row if gains is None else row | main_results.gain_metrics(gains)
 
 
-def line(title: str, evaluations: list, published: float = np.nan, trained: bool = False) -> str:
+def line(title: str, replicates: list, published: float = np.nan, trained: bool = False) -> str:
     """A row of the table: interquartile means over training seeds with 95 % intervals, and the paper's return."""
-    table = pd.DataFrame([numbers(*one) for one in evaluations], columns=COLUMNS)
-    values, cells = over_seeds(table), []
-    for name in COLUMNS:
-        value, low, high = (values[f"{name}{part}"] for part in ("", "_low", "_high"))
-        interval = "" if np.isnan(low) else f" [{low:.2f}, {high:.2f}]"
-        cells.append("" if np.isnan(value) else f"{value:.2f}{interval}")
+    shown = [*RETURNS, "gain_hypervolume"]
+    table = pd.DataFrame([numbers(one.evaluation, one.gains) for one in replicates], columns=shown)
+    values, cells = over_seeds(table) | main_results.scores(replicates), []
+    for name, decimals in COLUMNS.items():
+        value, low, high = (values.get(f"{name}{part}", np.nan) for part in ("", "_low", "_high"))
+        interval = "" if np.isnan(low) else f" [{low:.{decimals}f}, {high:.{decimals}f}]"
+        cells.append("" if np.isnan(value) else f"{value:.{decimals}f}{interval}")
     cells.append("" if np.isnan(published) else f"{published:.2f}")
     seeds = str(len(table)) if trained else ""
     return f"| {title} | {seeds} | " + " | ".join(cells) + " |\n"
@@ -86,16 +93,16 @@ def rows_of(results: Results, script: str, environment: str | None = None) -> li
     """`line`'s arguments, the title being the flags, for a script's rows that have runs, the default first."""
     published = main_results.paper_rows().paper_scalarized
     found = [
-        (key, [(one.evaluation, one.gains) for one in replicates])
+        (key, replicates)
         for key, replicates in results.rows_of_two_objectives().items()
         if key[0] == script and replicates and environment in (None, key[1])
     ]
     titled = []
-    for (_, env_id, setting), evaluations in found:
+    for (_, env_id, setting), replicates in found:
         parts = [flags(setting), "" if env_id in (GENERALIST, environment) else f"`{env_id}`"]
         title = ", ".join(filter(None, parts)) or "default"
         papers = published.get(methods.paper_name(script), np.nan) if title == "default" else np.nan
-        titled.append((title, evaluations, papers, script in methods.TRAINED))
+        titled.append((title, replicates, papers, script in methods.TRAINED))
     return sorted(titled, key=lambda row: row[0] != "default")
 
 

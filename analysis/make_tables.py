@@ -4,7 +4,9 @@
 
 Runs are recognised by their config.json, never by the name of their folder. Runs of one script that differ only in
 the seed form one row: the metrics are computed for each run, then aggregated over training seeds (interquartile mean,
-95 % bootstrap interval). All numbers are of the sampled policy. A column "sd over episodes" is the paper's kind of +-.
+95 % bootstrap interval). The main table has the score of the greedy and of the sampled policy; all other numbers are of
+the one that is primary: greedy, or in older runs, whose config.json does not say, sampled. A column "sd over episodes"
+is the paper's kind of +-.
 """
 
 import sys
@@ -47,6 +49,9 @@ TABLES = (
     single_sites,
     distance_to_best,
 )
+
+EXPLANATION = """Score: 0 is to do nothing, 100 the best constant plan of each weight. Interquartile mean over training
+seeds [95 % bootstrap interval, of score and gain over seeds and sites]. Seeds to tell 0.1: a method, of gain."""
 
 
 @dataclass
@@ -101,7 +106,7 @@ def main(args: Args) -> None:
             text = readable(table, module.COLUMNS)
             write_table(folder / name_of(module), table, text)
             if module is main_results:
-                print("Sampled policies; interquartile mean over training seeds [95 % bootstrap interval].\n")
+                print(f"{EXPLANATION}\n")
                 print(text[list(main_results.TERMINAL)].to_string(index=False))
         others = many_objectives.make(results)
         for name, (table, columns) in others.items():

@@ -24,6 +24,14 @@ from cleanrl_style.protocol.fronts import (  # noqa: F401
     weight_columns,
     weights_of,
 )
+from cleanrl_style.protocol.score import (  # noqa: F401
+    best_constant_plans,
+    by_weight,
+    gain_hypervolume,
+    gains,
+    mean_scalarized,
+    score,
+)
 
 
 def pair(preference) -> np.ndarray:
@@ -38,37 +46,7 @@ def mean_returns(evaluation: pd.DataFrame) -> pd.DataFrame:
     return by_weight(evaluation)[return_columns(objectives)].mean().sort_index()
 
 
-def by_weight(evaluation: pd.DataFrame):
-    """The evaluation grouped by weight: by one column of two objectives, else by one an objective."""
-    weights = weight_columns(objectives_of(evaluation.columns))
-    return evaluation.groupby(weights[0] if len(weights) == 1 else weights)
-
-
-def mean_scalarized(evaluation: pd.DataFrame) -> float:
-    """Scalarised return, averaged over weights and episodes."""
-    return float(scalarize(returns_of(evaluation), weights_of(evaluation)).mean())
-
-
 # ----------------------------------------------------------------------------- paired over the same episodes
-
-
-def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame) -> pd.DataFrame:
-    """The evaluation with the returns of zero change on the same site and weather subtracted.
-
-    Raises ValueError if zero change was not evaluated on every one of the evaluation's seeds.
-    """
-    columns = return_columns(objectives_of(evaluation.columns))
-    reference = zero_change.drop_duplicates("seed").set_index("seed")[columns]
-    missing = sorted(set(evaluation.seed) - set(reference.index))
-    if missing:
-        raise ValueError(
-            f"zero change was not evaluated on the episode with seed {missing[0]} "
-            f"(nor on {len(missing) - 1} others); evaluate both with the same --eval-episodes"
-        )
-    difference = evaluation.copy()
-    difference[columns] -= reference.loc[evaluation.seed].to_numpy()
-    difference["scalarized_return"] = scalarize(returns_of(difference), weights_of(difference))
-    return difference
 
 
 def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -196,3 +174,69 @@ def bootstrap_band(curves: np.ndarray, repetitions: int = 2000) -> tuple[np.ndar
     chosen = np.random.default_rng(0).integers(len(curves), size=(repetitions, len(curves)))
     low, high = np.percentile(stats.trim_mean(curves[chosen], 0.25, axis=1), [2.5, 97.5], axis=0)
     return middle, low, high
+
+
+# ---------------------------------------------------------------------- over training seeds and sites together
+
+
+def of_sites(gained: pd.DataFrame) -> pd.Series:
+    """Scalarised gain of each site (the episode's seed), averaged over the weights; ascending."""
+    return gained.groupby("seed").scalarized_return.mean().sort_index()
+
+
+def plans_of_sites(plans: pd.DataFrame, weights: np.ndarray) -> np.ndarray:
+    """Scalarised gains of constant plans (a) at each of the weights (k, m), (a, k, sites); sites by ascending seed.
+
+    plans : gains, of `reference.py`'s form
+    """
+    columns = return_columns(objectives_of(plans.columns))
+    cube = [plans.pivot(index="plan", columns="seed", values=name).to_numpy() for name in columns]
+    return np.einsum("mas,km->aks", np.array(cube), weights)
+
+
+def score_interval(gained: np.ndarray, plans: np.ndarray | None, repetitions: int = 4000) -> tuple[float, float, float]:
+    """IQM of the score over training seeds, and its 95 % bootstrap interval over seeds and sites, both drawn anew.
+
+    gained : (seeds, sites), of `of_sites`; plans : (plans, weights, sites) on the same sites, whose best is chosen
+    anew on every drawn set of sites; None: the gain itself, not the score. The interval is NaN for fewer than two
+    seeds. Deterministic. Sites are drawn as if they had been chosen by chance: as they are stratified, their part of
+    the interval is rather too wide.
+    """
+    gained = np.asarray(gained, dtype=float)
+    seeds, sites = gained.shape
+
+    def of(shares):
+        """Score of each seed, (sets, seeds), by the sites' shares in a set, (sets, sites)."""
+        means = shares @ gained.T
+        if plans is None:
+            return means
+        best = (plans.reshape(-1, sites) @ shares.T).reshape(*plans.shape[:2], -1).max(axis=0).mean(axis=0)
+        return 100 * means / np.where(best > 0, best, np.nan)[:, None]
+
+    middle = iqm(of(np.full((1, sites), 1 / sites))[0])
+    if seeds < 2:
+        return middle, np.nan, np.nan
+    generator = np.random.default_rng(0)
+    scores = of(generator.multinomial(sites, np.full(sites, 1 / sites), repetitions) / sites)
+    drawn = generator.integers(seeds, size=(repetitions, seeds))
+    values = stats.trim_mean(np.take_along_axis(scores, drawn, axis=1), 0.25, axis=1)
+    low, high = np.nanpercentile(values, [2.5, 97.5])
+    return middle, float(low), float(high)
+
+
+def seeds_to_tell(values: np.ndarray, difference: float = 0.1, power: float = 0.8) -> float:
+    """Training seeds a method that tell two methods apart, which differ so much, on the same sites (NaN below two).
+
+    By a two-sided t test at 5 %; both vary between seeds as the values do.
+    """
+    values = np.asarray(values, dtype=float)
+    if len(values) < 2:
+        return np.nan
+    deviation = values.std(ddof=1)
+    for seeds in range(2, 1000):
+        if deviation == 0:
+            return seeds
+        freedom, shift = 2 * seeds - 2, difference / deviation * np.sqrt(seeds / 2)
+        if stats.nct.sf(stats.t.ppf(0.975, freedom), freedom, shift) >= power:
+            return seeds
+    return np.inf

@@ -22,7 +22,6 @@ from cleanrl_style.protocol import EPISODE_INFO, fronts
 from cleanrl_style.protocol.evaluation import EVALUATION_INFO
 from sim.demography import AGE_CLASSES
 
-PRIMARY = "sampled"  # the policy that tables and figures are about
 BINS = 40
 EVERY, FEWEST_ROUNDS = 8, 16  # of fewer rounds all are kept
 SPECIES = ("conifer", "deciduous")
@@ -41,14 +40,16 @@ FLOAT_FORMAT = "%.6g"
 FLOAT_FORMATS = {"timing": "%.12g", "learning": "%.12g"}  # differences of statistics need more digits
 
 
-def reduce(tables: dict[str, pd.DataFrame], steps: int | None) -> dict[str, pd.DataFrame]:
+def reduce(tables: dict[str, pd.DataFrame], steps: int | None, primary: str) -> dict[str, pd.DataFrame]:
     """A run's own tables by name, those that it has, as the tables that are kept of it.
 
-    steps : of its training; None for a fixed strategy
+    steps : of its training; None for a fixed strategy. primary : the policy that its results are about
     """
-    kept = {"evaluation": evaluation(tables["evaluation"]), "timing": timing(tables["timing"])}
+    kept = {"evaluation": evaluation(tables["evaluation"], primary), "timing": timing(tables["timing"])}
     if "evaluation_years" in tables:
-        kept |= {"years": years(tables["evaluation_years"]), "last_year": last_year(tables["evaluation_years"])}
+        record = tables["evaluation_years"]
+        record = record[record.policy == primary].drop(columns="policy")
+        kept |= {"years": years(record), "last_year": last_year(record)}
     if "episodes" in tables:
         episodes = tables["episodes"]
         kept |= {"learning": learning(episodes, steps), "sample": sample(episodes)}
@@ -72,21 +73,21 @@ def parse(text: str) -> pd.DataFrame:
 # ---------------------------------------------------------------------------------------------- evaluation
 
 
-def evaluation(table: pd.DataFrame) -> pd.DataFrame:
+def evaluation(table: pd.DataFrame, primary: str) -> pd.DataFrame:
     """All episodes, without their number, which their seed gives; EVALUATION_INFO of the primary policy alone."""
     info = [name for name in EVALUATION_INFO if name in table]
     table = table.drop(columns="episode")
-    table[info] = table[info].where(table.policy == PRIMARY)
+    table[info] = table[info].where(table.policy == primary)
     return table
 
 
 def kept_weights(record: pd.DataFrame) -> pd.DataFrame:
-    """The annual record of the primary policy at one objective's weights alone, and at equal ones."""
+    """The annual record of a policy at one objective's weights alone, and at equal ones."""
     weights = [name for name in record if name == "preference" or name.startswith("weight_")]
     values = record[weights].to_numpy()
     number = 2 if weights == ["preference"] else len(weights)
     corner, centre = np.isin(values, (0, 1)).all(axis=1), np.isclose(values, 1 / number).all(axis=1)
-    return record[(record.policy == PRIMARY) & (corner | centre)].drop(columns="policy")
+    return record[corner | centre]
 
 
 def years(record: pd.DataFrame) -> pd.DataFrame:

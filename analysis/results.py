@@ -1,6 +1,6 @@
 """What tables and figures are made of: the runs that exist, sorted into the experiments' rows, and the studies."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import experiments, methods, metrics, paths, reduction, runs, stored
+from cleanrl_style import protocol
 
 PAIR = ["carbon", "thaw"]  # the paper's objectives
 
@@ -19,10 +20,24 @@ class Replicate:
     runs: list[runs.Run]
     evaluation: pd.DataFrame
     gains: pd.DataFrame | None  # the evaluation less zero change on the same episodes, if that was evaluated
+    by_policy: dict[str, pd.DataFrame] = field(default_factory=dict)  # gains of each policy
+    plans: pd.DataFrame | None = None  # gains of the constant plans on its episodes, if they were evaluated
 
     def each_run(self) -> list["Replicate"]:
         """Its runs, each a replicate of its own."""
         return [Replicate([run], run.evaluation, None) for run in self.runs]
+
+    @property
+    def score(self) -> float:
+        """Of the primary policy; NaN without constant plans on its episodes."""
+        return self.score_of(self.gains)
+
+    def score_of(self, gained: pd.DataFrame | None) -> float:
+        """The score of gains on its episodes."""
+        if gained is None or self.plans is None:
+            return np.nan
+        weights = np.unique(metrics.weights_of(gained), axis=0)
+        return metrics.score(gained, metrics.best_constant_plans(self.plans, weights))
 
     @property
     def years(self) -> pd.DataFrame:
@@ -108,19 +123,59 @@ class Results:
     def _replicate(self, _, its_runs) -> Replicate:
         evaluation = pd.concat([run.evaluation for run in its_runs], ignore_index=True)
         conditions = {name: its_runs[0].arguments[name] for name in ("env_id", "thaw_formulation", "site_seed")}
-        return Replicate(its_runs, evaluation, self.gains(evaluation, **conditions))
+        by_policy = {
+            policy: pd.concat([run.of_policy(policy) for run in its_runs], ignore_index=True)
+            for policy in protocol.POLICIES
+        }
+        return self.replicate(its_runs, evaluation, by_policy, **conditions)
+
+    def replicate(self, its_runs, evaluation, by_policy, env_id, **conditions) -> Replicate:
+        """A replicate of an evaluation, of the primary policy and of each, with its gains if they are known."""
+        gained = self.gains(evaluation, env_id, **conditions)
+        if gained is None:
+            return Replicate(its_runs, evaluation, None)
+        both = {
+            policy: self.gains(table, env_id, **conditions)
+            for policy, table in by_policy.items()
+            if len(table) == len(evaluation)
+        }
+        return Replicate(its_runs, evaluation, gained, both, self.plans(evaluation, env_id, **conditions))
+
+    def plans(self, evaluation, env_id, thaw_formulation="asymmetric", site_seed=None) -> pd.DataFrame | None:
+        """Gains of the constant plans on an evaluation's episodes; None if they were not evaluated on them."""
+        table, columns = self.constant_plans, metrics.return_columns(PAIR)
+        its_objectives = metrics.objectives_of(evaluation.columns)
+        if table is None or its_objectives != PAIR or thaw_formulation != "asymmetric" or site_seed is not None:
+            return None
+        table = table[(table.env_id == env_id) & table.seed.isin(evaluation.seed)]
+        if set(table.seed) != set(evaluation.seed):
+            return None
+        table = table.assign(plan=table.action.astype(str))[["plan", "seed", *columns]]
+        zero = self.zero_change(env_id, thaw_formulation, site_seed)
+        nothing = zero.drop_duplicates("seed").set_index("seed")[columns]
+        table[columns] -= nothing.loc[table.seed].to_numpy()
+        return table
 
     def gains(self, evaluation, env_id, thaw_formulation="asymmetric", site_seed=None) -> pd.DataFrame | None:
         """An evaluation less zero change under the same reward; None if that was not evaluated on its episodes."""
+        longest = self.zero_change(env_id, thaw_formulation, site_seed)
+        known = longest is not None and set(evaluation.seed) <= set(longest.seed)
+        return metrics.gains(evaluation, longest) if known else None
+
+    def zero_change(self, env_id, thaw_formulation, site_seed) -> pd.DataFrame | None:
+        """The longest evaluation of zero change under these conditions; None without one."""
         conditions = {"env_id": env_id, "thaw_formulation": thaw_formulation, "site_seed": site_seed}
         same = [
             run.evaluation
             for run in self.runs
             if run.script == "zero_change" and all(run.arguments[name] == value for name, value in conditions.items())
         ]
-        longest = max(same, key=len, default=None)
-        known = longest is not None and set(evaluation.seed) <= set(longest.seed)
-        return metrics.gains(evaluation, longest) if known else None
+        return max(same, key=len, default=None)
+
+    @cached_property
+    def constant_plans(self) -> pd.DataFrame | None:
+        """The study of that name."""
+        return self.study("constant_plans")
 
     def objectives(self, env_id: str) -> list[str]:
         """An environment's objectives, by its runs; the paper's two without a run."""

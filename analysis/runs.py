@@ -41,10 +41,19 @@ class Run:
         return self.config["arguments"]
 
     @property
+    def primary(self) -> str:
+        """The policy that its results are about."""
+        return primary_of(self.config)
+
+    @property
     def evaluation(self) -> pd.DataFrame:
         """The episodes of the primary policy."""
+        return self.of_policy(self.primary)
+
+    def of_policy(self, policy: str) -> pd.DataFrame:
+        """The episodes of one policy."""
         table = self.tables["evaluation"]
-        return table[table.policy == reduction.PRIMARY]
+        return table[table.policy == policy]
 
     def course(self, column: str, statistic: str = "mean", parts: int = reduction.BINS) -> np.ndarray:
         """Mean or standard deviation ("std") of a column in equal parts of the training, see `reduction.course`."""
@@ -60,6 +69,11 @@ class Run:
         """Share of a curriculum's episodes that it was trained on."""
         (row,) = self.tables["selection"].itertuples()
         return row.selected / row.episodes
+
+
+def primary_of(config: dict) -> str:
+    """The policy that a run's results are about: it is written down since it is the greedy one."""
+    return config.get("primary_policy", "sampled")
 
 
 def setting(not_default: dict, mode: str) -> str:
@@ -127,29 +141,30 @@ def read_run(folder: Path) -> Run:
     config = read_config(folder)
     if (folder / ARCHIVED).exists():
         run = Run(folder, config, read_archived(folder))
-        check(run.evaluation, config["arguments"])
+        check(run.tables["evaluation"], config)
         return run
     steps = config["arguments"].get("total_timesteps")
     tables = read_whole(folder, steps is not None)
-    check(tables["evaluation"], config["arguments"])
+    check(tables["evaluation"], config)
     try:
-        return Run(folder, config, reduction.reduce(tables, steps))
+        return Run(folder, config, reduction.reduce(tables, steps, primary_of(config)))
     except (KeyError, TypeError) as error:
         raise ValueError(f"damaged: a table lacks a column ({error})") from error
 
 
-def check(evaluation: pd.DataFrame, arguments: dict) -> None:
+def check(evaluation: pd.DataFrame, config: dict) -> None:
     """ValueError if an evaluation is not whole."""
     objectives = fronts.objectives_of(evaluation.columns)
     needed = ["policy", "seed", "site_seed", "scalarized_return", *fronts.weight_columns(objectives)]
     missing = [name for name in needed if name not in evaluation]
     if missing:
         raise ValueError(f"damaged: evaluation.csv with the returns of {objectives} lacks the column {missing[0]}")
-    evaluation = evaluation[evaluation.policy == reduction.PRIMARY]
+    arguments, primary = config["arguments"], primary_of(config)
+    evaluation = evaluation[evaluation.policy == primary]
     expected = len(arguments["eval_weights"]) * arguments["eval_episodes"]
     if len(evaluation) != expected:
         raise ValueError(
-            f"damaged: evaluation.csv has {len(evaluation)} episodes of the {reduction.PRIMARY} policy, not {expected}"
+            f"damaged: evaluation.csv has {len(evaluation)} episodes of the {primary} policy, not {expected}"
         )
     if not np.isfinite(evaluation[fronts.return_columns(objectives)].to_numpy(dtype=float)).all():
         raise ValueError("damaged: evaluation.csv has returns that are not finite numbers")

@@ -26,10 +26,10 @@ class Args:
     """another fixed site in site-specific mode; in generalist mode one site, under new weather in every episode"""
     thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] | None = None
     """formula of the thaw reward (None: the environment's, asymmetric)"""
-    eval_episodes: int = 100
-    """evaluation episodes per weight"""
+    eval_episodes: int = 200
+    """evaluation episodes per weight, each on a site of its own"""
     eval_weights: tuple[float, ...] | None = None
-    """carbon weights of the evaluation (None: 0 0.1 .. 1); of three and more objectives, as many numbers a weight"""
+    """carbon weights of the evaluation (None: 0 0.25 .. 1); of three and more objectives, as many numbers a weight"""
     run_dir: str | None = None
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False

@@ -55,8 +55,8 @@ class Args:
     """coefficient of the entropy bonus, in units of return; 0 by the definition"""
 
     # Evaluation and output
-    eval_episodes: int = 100
-    """evaluation episodes"""
+    eval_episodes: int = 200
+    """evaluation episodes, each on a site of its own"""
     run_dir: str | None = None
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False

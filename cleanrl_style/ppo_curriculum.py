@@ -76,10 +76,10 @@ class Args:
     """what scores an episode: a random network of its site, or, as a control, a uniform draw"""
 
     # Evaluation and output
-    eval_episodes: int = 100
-    """evaluation episodes per weight"""
+    eval_episodes: int = 200
+    """evaluation episodes per weight, each on a site of its own"""
     eval_weights: tuple[float, ...] | None = None
-    """carbon weights of the evaluation (None: 0 0.1 .. 1); of three and more objectives, as many numbers a weight"""
+    """carbon weights of the evaluation (None: 0 0.25 .. 1); of three and more objectives, as many numbers a weight"""
     run_dir: str | None = None
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False

@@ -127,24 +127,33 @@ class Stands:
         """
         stands = np.atleast_1d(np.asarray(stands, dtype=int))
         ranges = {**INITIAL_RANGES, **(initial_ranges or {})}
+        given = [(initial or {}).get(k) or {} for k in range(len(stands))]
         for k, stand in enumerate(stands):
-            site = sites[k]
-            values = {**site, **self.constants, **self.mechanisms, **self.weather, **WITHOUT_SCENARIO}
-            self.parameters[stand] = [values[name] for name in PARAMETER_NAMES]
-            generator = np.random.default_rng(seeds[k].start)
-            self.state[stand] = first_state(values, generator, (initial or {}).get(k), ranges)
             self.seeds[stand] = seeds[k]
             self.years[stand] = 0
             self._weather[stand] = np.random.default_rng(seeds[k].weather)
             self._disturbance[stand] = np.random.default_rng(seeds[k].disturbance)
+        # of stands that begin alike, the first is spun up, for all of them
+        first: dict[tuple, int] = {}
+        alike = [
+            first.setdefault((tuple(sites[k].items()), seeds[k].start, tuple(given[k].items())), k)
+            for k in range(len(stands))
+        ]
+        spun_up = list(first.values())
+        for k in spun_up:
+            values = {**sites[k], **self.constants, **self.mechanisms, **self.weather, **WITHOUT_SCENARIO}
+            self.parameters[stands[k]] = [values[name] for name in PARAMETER_NAMES]
+            generator = np.random.default_rng(seeds[k].start)
+            self.state[stands[k]] = first_state(values, generator, given[k], ranges)
         whole_year = observed is not None and len(observed) == DAYS * self.steps_per_day
-        given = [(initial or {}).get(k) or {} for k in range(len(stands))]
-        found = np.array([[f"{name}_kgc_m2" not in stocks for name in DEADWOOD] for stocks in given])
-        last_year = self._spin_up(stands, found, observed if whole_year else None)
+        found = np.array([[f"{name}_kgc_m2" not in given[k] for name in DEADWOOD] for k in spun_up])
+        last_year = self._spin_up(stands[spun_up], found, observed if whole_year else None)
         if self.soil_carbon == "balanced":
-            drawn = [k for k in range(len(stands)) if "soil_kgc_m2" not in given[k]]
+            drawn = [i for i, k in enumerate(spun_up) if "soil_kgc_m2" not in given[k]]
             if drawn:
-                self._balance_soil_carbon(stands[drawn], last_year[drawn])
+                self._balance_soil_carbon(stands[spun_up][drawn], last_year[drawn])
+        for rows in (self.parameters, self.state):
+            rows[stands] = rows[stands[alike]]
 
     def _balance_soil_carbon(self, stands, record) -> None:
         """First soil carbon that the litter keeps up; as drawn where there are no trees. record : of a year."""

@@ -30,7 +30,6 @@ from analysis.paper_claims.claim import (
 )
 from analysis.paper_claims.evidence import Evidence
 from analysis.results import Results
-from analysis.studies.constant_plans import PLANTING
 from analysis.studies.mechanism_pairs import MEANS, OFF, PAIRS
 
 GENERALIST = "boreal-generalist-v0"
@@ -212,7 +211,7 @@ def test_what_is_learnt_is_measured_from_random_actions(tmp_path):
             "carbon_return": 1.0 + (action == 20) + k,
             "thaw_return": -1.0 + k,
         }
-        for action in PLANTING
+        for action in range(15, 25)
         for k in (0, 1)
     ]
     stored.write(studies / "constant_plans.csv", pd.DataFrame(rows), {})
@@ -357,7 +356,7 @@ def write_everything(folder, jobs):
         [
             (env, action, seed, *generator.normal(size=2))
             for env in (GENERALIST, "boreal-balanced-v0")
-            for action in PLANTING
+            for action in range(15, 25)
             for seed in (0, 1)
         ],
         columns=["env_id", "action", "seed", "carbon_return", "thaw_return"],

@@ -1,20 +1,40 @@
+"""Plans that look at nothing, as the score and the tables have them."""
+
 import numpy as np
 import pandas as pd
 
 from analysis.studies import constant_plans
-from cleanrl_style import protocol
+from cleanrl_style.protocol import reference
+
+
+class Stage:
+    """Stands for the environments: two, of which the second has no room to plant; notes what is done."""
+
+    def close(self):
+        """Nothing to close."""
 
 
 def test_a_plan_is_carried_out_where_it_is_valid(monkeypatch):
-    masks = np.zeros((2, 25), dtype=bool)
-    masks[0, constant_plans.PLANTING] = True
-    observations = np.ones((2, 105), dtype=np.float32)
+    masks = np.ones((len(reference.PLANS), 25), dtype=bool)
+    masks[:, 15:] = False  # no room to plant
     chosen = []
 
-    def evaluate(task, policy, weights, episodes, policies):
-        chosen.append(policy(observations, masks, None).argmax(axis=1).tolist())
-        return pd.DataFrame(columns=["episode", "seed", "carbon_return", "thaw_return"]), None
+    def play(task, envs, policy, weights, seeds, greedy):
+        chosen.extend(policy(np.ones((len(seeds), 105)), masks[: len(seeds)], None).argmax(axis=1).tolist())
+        return np.ones((len(seeds), 2)), None
 
-    monkeypatch.setattr(protocol, "evaluate", evaluate)
-    constant_plans.study("boreal-generalist-v0", 1)
-    assert chosen == [[action, 12] for action in constant_plans.PLANTING]
+    monkeypatch.setattr(reference, "play", play)
+    monkeypatch.setattr(reference, "make_envs", lambda task, number: Stage())
+    monkeypatch.setattr(reference, "compile_physics", lambda lanes: None)
+    task = constant_plans.protocol.Task.of("boreal-generalist-v0")
+    table = reference.measure(task, [7])
+    assert table.plan.tolist() == list(reference.PLANS) and set(table.seed) == {7}
+    assert chosen == [min(int(plan), 14) if int(plan) < 15 else 12 for plan in reference.PLANS]
+    assert len(reference.PLANS) == 21 and reference.PLANS[0] == "12"
+
+
+def test_the_study_has_every_constant_plan_and_no_strategy(monkeypatch):
+    plans = pd.DataFrame({"plan": ["12", "24", "random_valid"], "seed": 1, "carbon_return": 0.0, "thaw_return": 1.0})
+    monkeypatch.setattr(constant_plans, "reference_returns", lambda task, seeds: plans)
+    table = constant_plans.study("boreal-generalist-v0", 1)
+    assert table.action.tolist() == [12, 24] and set(table.env_id) == {"boreal-generalist-v0"}

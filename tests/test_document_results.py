@@ -44,11 +44,14 @@ def test_rows_are_those_of_the_runs(tmp_path):
     cells = [cell.strip() for cell in default.split("|")[1:-1]]
     assert len(cells) == len(head.split("|")) - 2
     assert cells[:2] == ["default", "2"]
-    assert [cell.split(" ")[0] for cell in cells[2:6]] == ["0.50", "1.50", "-2.00", "-2.00"]
+    assert cells[2:4] == ["", ""]  # no constant plans, no score
+    assert [cell.split(" ")[0] for cell in cells[6:10]] == ["0.50", "1.50", "-2.00", "-2.00"]
     # weights 0, 0.5, 1: (-1, -0.5, 1) and (-3, -1, 2); zero change has nothing, so gains are the same
-    assert cells[6].split(" ")[0] == "-0.42" and cells[7] == cells[6]
-    assert cells[9] == "4.70"  # the paper's
-    assert variant.startswith("| `--ent-coef 0.0 --hide-site` | 1 | 1.00 | 1.00 | 0.00 |") and variant.endswith("|  |")
+    assert cells[4].split(" ")[0] == cells[10].split(" ")[0] == "-0.42"
+    assert cells[11] == "4.70"  # the paper's
+    assert variant.startswith("| `--ent-coef 0.0 --hide-site` | 1 |  |  | 0.50 | 0.00 | 1.00 |") and variant.endswith(
+        "|  |"
+    )
 
 
 def test_all_methods_and_the_heuristics(tmp_path):

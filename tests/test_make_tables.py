@@ -60,7 +60,7 @@ def test_main_results(tables):
     assert row.cardinality == 3
     # weights w and 1 - w of (0, 2) or (2, 0): twice the larger, on average over 50 weights a little above 1.5
     assert row.expected_utility == pytest.approx(2 * np.mean([max(k, 49 - k) / 49 for k in range(50)]))
-    assert row.gain_hypervolume == pytest.approx(3 * 3 + 1 * 2 + 1 * 1)  # gains (1, 1), (2, 0), (3, -1)
+    assert row.gain_hypervolume == pytest.approx(1)  # gains (1, 1), (2, 0), (3, -1) above (0, 0)
     assert row.gain_scalarized == pytest.approx((1 + 1 + 3) / 3)
     assert (row.carbon_change, row.thaw_change, row.carbon_slope, row.thaw_slope) == pytest.approx((2, -2, 2, -2))
     assert np.isnan(row.scalarized_low)
@@ -282,11 +282,35 @@ def test_gains_need_zero_change_on_the_same_episodes(tmp_path, capsys):
     assert "zero_change.py" in capsys.readouterr().out
 
 
+def test_the_score_of_both_policies(tmp_path, monkeypatch):
+    """Best constant plans: 4, 2 and 2 of weights 0, 0.5 and 1."""
+    zero = dict(carbon=(0, 0, 0), thaw=(0, 0, 0))
+    write_run(tmp_path / "runs" / "zero", "zero_change", **zero, vectorization="lockstep")
+    for seed in (1, 2):
+        write_run(tmp_path / "runs" / str(seed), "ppo_gated", seed=seed, carbon=(0, 0, 2), thaw=(4, seed, 0))
+    plans = [
+        {"env_id": MAIN[1], "action": action, "seed": seed, "carbon_return": c + site, "thaw_return": t + 3 * site}
+        for action, c, t in ((12, 0, 0), (20, 2, 0), (24, 0, 4))
+        for seed, site in ((0, -1.0), (1, 1.0))
+    ]
+    stored.write(tmp_path / "studies" / "constant_plans.csv", pd.DataFrame(plans), {})
+    monkeypatch.setattr(paths, "studies", lambda quick: tmp_path / "studies")
+    table = make(tmp_path / "runs", tmp_path / "tables")
+    row = table.loc[("ppo_gated", MAIN[1], "default")]
+    # gains 4, 0.5 or 1, 2 of the sampled policy, of 4, 2, 2
+    assert row.primary == "sampled" and row.score_sampled == pytest.approx(100 * (6.5 + 7) / 2 / 8)
+    assert row.score_sampled_low <= row.score_sampled <= row.score_sampled_high
+    assert row.score_greedy == pytest.approx(row.score_sampled + 100 * 100 * 3 / 8)  # 100 more of both returns
+    assert row.gain_scalarized == pytest.approx((6.5 + 7) / 6) and row.seeds_to_tell == 9
+    assert table.score_sampled["best_constant_mix", MAIN[1], "default"] == pytest.approx(100)
+    assert table.score_sampled["zero_change"].tolist() == [0]
+
+
 def test_a_policy_without_preference_has_neither_sparsity_nor_response(tables):
     key = ("zero_change", "boreal-generalist-v0", "default")
     row = read(tables, "main_results", ["method", "environment", "setting"]).loc[key]
     assert np.isnan(row.sparsity) and np.isnan(row.carbon_change)
-    assert row.hypervolume == pytest.approx(1 * 3) and row.gain_hypervolume == pytest.approx(4)
+    assert row.hypervolume == pytest.approx(1 * 3) and row.gain_hypervolume == 0
 
 
 def test_three_objectives_have_tables_of_their_own(tables, tmp_path):

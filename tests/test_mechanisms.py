@@ -5,6 +5,7 @@ from scripts import run_script
 
 from analysis import stored
 from analysis.studies import constant_plans, mechanism_pairs, site_warming
+from cleanrl_style.protocol import reference
 from cleanrl_style.protocol.fronts import evaluation_weights
 
 
@@ -41,7 +42,7 @@ def test_constant_plans_as_an_evaluation():
     best = constant_plans.as_evaluation(plans, evaluation_weights(2), best=True)
     # conifers 3 w - 2 (1 - w), deciduous w + (1 - w): equal at w = 0.6
     chosen = best.groupby("preference").action.first()
-    assert (chosen[chosen.index < 0.55] == 20).all() and (chosen[chosen.index > 0.65] == 24).all()
+    assert chosen.tolist() == [20, 20, 20, 24, 24]
     assert best[best.preference == 1].scalarized_return.tolist() == [2, 4]
     dense = constant_plans.as_evaluation(plans, evaluation_weights(2), best=False)
     assert (dense.action == 24).all() and len(dense) == 2 * len(evaluation_weights(2))
@@ -57,12 +58,14 @@ def test_drawn_episodes_are_of_both_kinds():
 
 
 def test_a_study_is_made_once(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(constant_plans, "PLANTING", (24,))
+    monkeypatch.setattr(reference, "PLANS", ("12", "24"))
+    monkeypatch.setattr(reference, "cache_folder", lambda: tmp_path / "cache" / "kernels")
+    monkeypatch.setattr(reference, "shipped", lambda env_id: tmp_path / "none")
     monkeypatch.setattr(constant_plans.paths, "studies", lambda quick: tmp_path)
     monkeypatch.setattr(constant_plans.open_loop, "fingerprint", lambda: "physics")
     constant_plans.main(constant_plans.Args(quick=True))
     table = stored.read(tmp_path / "constant_plans.csv")
-    assert table.groupby("env_id").size().tolist() == [2, 2]
+    assert table.groupby("env_id").size().tolist() == [4, 4]
     seeds = [set(rows.seed) for _, rows in table.groupby("env_id")]
     assert seeds[0] == seeds[1] and len(seeds[0]) == 2
     constant_plans.main(constant_plans.Args(quick=True))

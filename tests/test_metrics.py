@@ -206,3 +206,51 @@ def test_band_is_the_interval_at_each_point():
         assert (low[k], high[k]) == pytest.approx(metrics.bootstrap_interval(curves[:, k]), abs=0.15)
     middle, low, high = metrics.bootstrap_band(curves[:1])
     assert middle == pytest.approx(curves[0]) and np.isnan([low, high]).all()
+
+
+def plans_and_agents(rng, seeds=10, sites=100, between_seeds=0.1, between_sites=0.7):
+    """Gains of agents, (seeds, sites), half of those of two constant plans, (plans, weights, sites)."""
+    site = rng.normal(0, between_sites, sites)
+    plans = np.stack([[2 + site, 1 + site], [1 + site, 2 + site]])
+    return 1 + site / 2 + rng.normal(0, between_seeds, (seeds, 1)), plans
+
+
+def test_score_over_seeds_and_sites():
+    gained, plans = plans_and_agents(np.random.default_rng(1))
+    value, low, high = metrics.score_interval(gained, plans)
+    assert (value, low, high) == metrics.score_interval(gained, plans)
+    assert low < value < high and value == pytest.approx(50, abs=5)
+    assert metrics.score_interval(plans.max(axis=0).mean(axis=0)[None], plans)[0] == pytest.approx(100)
+    assert metrics.score_interval(np.zeros((3, 100)), plans) == (0, 0, 0)
+    assert np.isnan(metrics.score_interval(gained[:1], plans)[1:]).all()
+
+
+def test_both_seeds_and_sites_widen_the_interval():
+    def width(**changes):
+        gained, _ = plans_and_agents(np.random.default_rng(1), **changes)
+        _, low, high = metrics.score_interval(gained, None)
+        return high - low
+
+    # 4 standard errors: of 100 sites' halved deviation, of the IQM of ten seeds (1.2 times the variance of their mean)
+    assert width(between_seeds=0.0) == pytest.approx(4 * 0.35 / 10, rel=0.2)
+    assert width(between_sites=0.0) == pytest.approx(4 * 0.1 * np.sqrt(1.2 / 10), rel=0.4)
+    assert width() > max(width(between_seeds=0.0), width(between_sites=0.0))
+
+
+def test_seeds_that_tell_a_difference():
+    values = np.array([-1.0, 1.0]) * 0.1 / np.sqrt(2)  # deviation 0.1
+    # G*Power: two groups, d = 1, power 0.8, two-sided 5 %: 17 each
+    assert metrics.seeds_to_tell(values, difference=0.1) == 17
+    assert metrics.seeds_to_tell(values, difference=0.2) == 6
+    assert metrics.seeds_to_tell([1.0, 1.0]) == 2 and np.isnan(metrics.seeds_to_tell([1.0]))
+
+
+def test_gains_of_sites_and_plans():
+    table = evaluation([[1, 2], [3, 4]], [[5, 6], [7, 8]], [0.0, 1.0])
+    table["scalarized_return"] = [5, 2, 7, 4]
+    assert metrics.of_sites(table).tolist() == [3.5, 5.5]
+    plans = pd.DataFrame(
+        {"plan": ["a", "a", "b", "b"], "seed": [1, 0, 0, 1], "carbon_return": [1, 2, 3, 4], "thaw_return": 0}
+    )
+    cube = metrics.plans_of_sites(plans, np.array([(0, 1), (1, 0)]))
+    assert cube.tolist() == [[[0, 0], [2, 1]], [[0, 0], [3, 4]]]

@@ -69,6 +69,14 @@ def test_results_do_not_depend_on_the_chunks(monkeypatch):
     pd.testing.assert_frame_equal(whole, evaluate(uniform)[0])
 
 
+@pytest.mark.parametrize("number", [1, 2, 128, 129, 130, 2000, 4200])
+def test_chunks_are_of_one_size(number):
+    chunks = evaluation.chunks(number)
+    assert [k for chunk in chunks for k in chunk] == list(range(number))
+    sizes = [len(chunk) for chunk in chunks]
+    assert max(sizes) <= evaluation.CHUNK and min(sizes) > 0.7 * max(sizes)
+
+
 def test_a_sampled_policy_is_reproducible_and_not_greedy():
     episodes, _ = evaluate(uniform)
     pd.testing.assert_frame_equal(episodes, evaluate(uniform)[0])
@@ -95,9 +103,9 @@ def test_the_policy_sees_the_accrued_returns():
         return optimal(observations, masks, accrued_returns)
 
     episodes, _ = evaluate(policy, eval_weights=(1.0,), eval_episodes=2)
-    assert len(seen) == 2 * LENGTH
-    for step, accrued in enumerate(seen[:LENGTH]):
-        np.testing.assert_allclose(accrued, [[step, 0]] * 2)
+    assert len(seen) == LENGTH  # both policies side by side
+    for step, accrued in enumerate(seen):
+        np.testing.assert_allclose(accrued, [[step, 0]] * 4)
 
 
 def test_sampling_follows_the_probabilities():

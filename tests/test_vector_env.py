@@ -196,3 +196,26 @@ def test_vector_step_refuses(actions, message):
     envs.reset(seed=1)
     with pytest.raises(ValueError, match=message):
         envs.step(actions)
+
+
+def test_stands_that_begin_alike_are_spun_up_once(monkeypatch):
+    spun_up, spin_up = [], sim.Stands._spin_up
+
+    def noted(stands, chosen, *args):
+        spun_up.append(len(chosen))
+        return spin_up(stands, chosen, *args)
+
+    monkeypatch.setattr(sim.Stands, "_spin_up", noted)
+    seeds = [5, 6, 5, 5, 6]
+    together = gym.make_vec("boreal-balanced-v0", num_envs=5, years=2, time_step_minutes=240)
+    observations, _ = together.reset(seed=seeds, options={"preference": 0.5})
+    assert spun_up == [2]
+    actions = np.array([24, 12, 12, 24, 0])
+    rewards = [together.step(actions)[1] for _ in range(2)]
+    for i, (seed, action) in enumerate(zip(seeds, actions, strict=True)):
+        alone = gym.make("boreal-balanced-v0", years=2, time_step_minutes=240)
+        observation, _ = alone.reset(seed=seed, options={"preference": 0.5})
+        np.testing.assert_array_equal(observation, observations[i])
+        for reward in rewards:
+            np.testing.assert_array_equal(alone.step(action)[1], reward[i])
+    assert not np.array_equal(rewards[0][0], rewards[0][2])  # their actions differ

@@ -2,9 +2,9 @@
 
     python analysis/studies/constant_plans.py
 
-Planting 50 or 100 stems/ha a year at each of the five mixes wherever there is room, on the evaluation's episodes; and
-every action every year on the single sites of the experiments, where all episodes are one. Leaves
-results/studies/constant_plans.csv and constant_plans_of_sites.csv, one row an episode.
+Every action every year, wherever it can be carried out: on the evaluation's episodes, where the score is measured by
+them (cleanrl_style/protocol/reference.py), and on the single sites of the experiments, where all episodes are one.
+Leaves results/studies/constant_plans.csv and constant_plans_of_sites.csv, one row an episode.
 """
 
 import contextlib
@@ -17,37 +17,31 @@ import pandas as pd
 import boreal_env
 import sim
 from analysis import experiments, metrics, paths, stored
-from analysis.reduction import PRIMARY
 from analysis.studies import open_loop
-from analysis.studies.measure_balance import where_valid
 from cleanrl_style import protocol
+from cleanrl_style.protocol.reference import reference_returns
 
 ENVIRONMENTS = (experiments.GENERALIST, experiments.BALANCED)
-PLANTING = tuple(range(15, 25))  # +50 and +100, five mixes each
 DENSE_CONIFER = 24
 
 
 @dataclass
 class Args:
-    """Evaluates constant planting under the protocol."""
+    """Evaluates constant plans under the protocol."""
 
-    eval_episodes: int = 100
+    eval_episodes: int = 200
     """evaluation episodes"""
     quick: bool = False
     """2 episodes, into results/quick/studies"""
 
 
 def study(env_id: str, episodes: int) -> pd.DataFrame:
-    """Returns of every planting action on the episodes of the evaluation."""
-    task, tables = protocol.Task.of(env_id), []
-    for action in PLANTING:
-
-        def probabilities(observations, masks, accrued_returns, action=action):
-            return np.eye(sim.management.NUM_ACTIONS)[where_valid(masks, action)]
-
-        table, _ = protocol.evaluate(task, probabilities, (0.0,), episodes, (PRIMARY,))
-        tables.append(table.assign(env_id=env_id, action=action))
-    return pd.concat(tables)[["env_id", "action", "episode", "seed", "carbon_return", "thaw_return"]]
+    """Returns of every constant plan on the episodes of the evaluation."""
+    task = protocol.Task.of(env_id)
+    table = reference_returns(task, protocol.evaluation_seeds(task, episodes))
+    table = table[table.plan.str.isdigit()]
+    table = table.assign(env_id=env_id, action=table.plan.astype(int))
+    return table[["env_id", "action", "seed", "carbon_return", "thaw_return"]]
 
 
 def study_of_sites(seeds) -> pd.DataFrame:
@@ -98,7 +92,7 @@ def main(args: Args) -> None:
     physics = open_loop.fingerprint()
     tables = {
         "constant_plans": (
-            {"episodes": args.eval_episodes, "actions": PLANTING, "physics": physics},
+            {"episodes": args.eval_episodes, "physics": physics},
             lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in ENVIRONMENTS]),
         ),
         "constant_plans_of_sites": ({"sites": sites, "physics": physics}, lambda: study_of_sites(sites)),

@@ -25,7 +25,6 @@ import pandas as pd
 import boreal_env
 import sim
 from analysis import experiments, methods, metrics, paths, runs, stored
-from analysis.reduction import PRIMARY
 from analysis.studies import fronts, open_loop
 from analysis.studies.open_loop import GAINS, RETURNS, with_gains
 from cleanrl_style import protocol
@@ -34,6 +33,7 @@ from cleanrl_style.protocol import evaluation
 FRONTS_DIR = paths.results() / "fronts"
 WEIGHTS = experiments.WEIGHTS
 BEST_OF_SITE, BEST_OF_ALL = "best constant plan of the site", "best constant plan of all sites"
+FIXED = "sampled"  # policy of what has but one
 WITHOUT_SITE = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
 
 #: What tells agents apart; `trained_on` is the seed of the one site that an agent was trained on, `trained_for` the
@@ -122,7 +122,7 @@ def constant_plans(plans: dict[int, pd.DataFrame], weights) -> pd.DataFrame:
             for site, table in plans.items():
                 plan = table[(table.kind == "constant") & (table.actions == chosen[site])]
                 gains = plan.sort_values("weather")[GAINS].to_numpy()
-                where = {"method": method, "site": site, "policy": PRIMARY, "weight": weight}
+                where = {"method": method, "site": site, "policy": FIXED, "weight": weight}
                 rows.append(where | means_of(gains, weight))
     return pd.DataFrame(rows)
 
@@ -183,7 +183,7 @@ def judge(policy, kwargs: dict, plans: dict[int, pd.DataFrame], weights, learnt:
     sites = list(plans)
     weathers = sorted(set(plans[sites[0]].weather))
     rows = []
-    for kind in protocol.POLICIES if learnt else (PRIMARY,):
+    for kind in protocol.POLICIES if learnt else (FIXED,):
         returns = play(policy, kwargs, sites, weathers, weights if learnt else (0.0,), kind == "greedy", played)
         returns = np.broadcast_to(returns, (len(weights), *returns.shape[1:]))
         for k, site in enumerate(sites):

@@ -1,4 +1,10 @@
-"""Main comparison: the metrics of every method, whether it follows the preference, and what constant plans reach."""
+"""Main comparison: the score of every method, its other metrics, whether it follows the preference; constant plans.
+
+The score is 100 x the gain over doing nothing, over that of the best constant plan of each weight. Score and gain have
+intervals over training seeds and evaluation sites together, the rest over training seeds. `seeds to tell 0.1` is how
+many a method it takes to tell another apart whose gain differs by so much. All but the two scores is of the policy
+named `primary`.
+"""
 
 import numpy as np
 import pandas as pd
@@ -6,6 +12,7 @@ import pandas as pd
 from analysis import metrics
 from analysis.studies.constant_plans import ENVIRONMENTS, as_evaluation
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
+from cleanrl_style import protocol
 from cleanrl_style.protocol.fronts import evaluation_weights
 
 TITLE = "Main results"
@@ -15,6 +22,12 @@ CONSTANT_PLANS = {
     "best_constant_mix": ("best constant plan of each weight", True),
 }
 COLUMNS = ROW_COLUMNS | {
+    "primary": "primary",
+    "score_greedy": "score, greedy",
+    "score_sampled": "score, sampled",
+    "gain_scalarized": "gain",
+    "seeds_to_tell": "seeds to tell 0.1",
+    "gain_hypervolume": "gain hypervolume",
     "scalarized": "scalarised",
     "paper_scalarized": "scalarised (paper)",
     "sd_over_episodes": "sd over episodes",
@@ -27,8 +40,6 @@ COLUMNS = ROW_COLUMNS | {
     "paper_detail_sparsity": "sparsity (paper's details)",
     "expected_utility": "expected utility",
     "cardinality": "cardinality",
-    "gain_scalarized": "gain",
-    "gain_hypervolume": "gain hypervolume",
     "gain_sparsity": "gain sparsity",
     "carbon_change": "carbon, weight 0 to 1",
     "thaw_change": "thaw, weight 0 to 1",
@@ -40,22 +51,27 @@ TERMINAL = (
     "environment",
     "setting",
     "seeds",
-    "scalarised",
-    "scalarised (paper)",
-    "hypervolume",
-    "hypervolume (paper)",
+    "score, greedy",
+    "score, sampled",
+    "gain",
+    "seeds to tell 0.1",
     "gain hypervolume",
 )
 
 
-def front_metrics(evaluation: pd.DataFrame, prefix: str = "") -> dict:
+def front_metrics(evaluation: pd.DataFrame, prefix: str = "", reference: float = metrics.REFERENCE_POINT) -> dict:
     """Mean scalarised return, hypervolume and sparsity of one run; one point has no sparsity."""
     front = metrics.mean_returns(evaluation).to_numpy()
     return {
         f"{prefix}scalarized": metrics.mean_scalarized(evaluation),
-        f"{prefix}hypervolume": metrics.hypervolume(front),
+        f"{prefix}hypervolume": metrics.hypervolume(front, reference),
         f"{prefix}sparsity": metrics.sparsity(front) if np.ptp(front, axis=0).any() else np.nan,
     }
+
+
+def gain_metrics(gains: pd.DataFrame) -> dict:
+    """The same of gains, whose hypervolume is above doing nothing."""
+    return front_metrics(gains, "gain_", 0.0)
 
 
 def run_metrics(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
@@ -71,7 +87,36 @@ def run_metrics(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
         for name in response.index:
             for kind in ("change", "slope"):
                 row[name.replace("return", kind)] = response.loc[name, kind]
-    return row if gains is None else row | front_metrics(gains, "gain_")
+    return row if gains is None else row | gain_metrics(gains)
+
+
+def scores(replicates: list) -> dict:
+    """Score of both policies and gain of the primary one, each with its interval over seeds and sites together."""
+    row = {name: np.nan for name in ("score_greedy", "score_sampled")}
+    known = [one for one in replicates if one.gains is not None]
+    if not known or len(known) < len(replicates):
+        return row
+    row |= named("gain_scalarized", *joint([one.gains for one in known], None))
+    row["seeds_to_tell"] = metrics.seeds_to_tell([metrics.mean_scalarized(one.gains) for one in known])
+    for policy in protocol.POLICIES:
+        tables = [one.by_policy.get(policy) for one in known]
+        if known[0].plans is not None and all(table is not None for table in tables):
+            row |= named(f"score_{policy}", *joint(tables, known[0].plans))
+    return row
+
+
+def joint(tables: list[pd.DataFrame], plans: pd.DataFrame | None) -> tuple[float, float, float]:
+    """Score, or without plans the gain, over training seeds, with its interval; tables : of the seeds' gains."""
+    weights = np.unique(metrics.weights_of(tables[0]), axis=0)
+    by_site = pd.DataFrame([metrics.of_sites(table) for table in tables])
+    if by_site.isna().any(axis=None):
+        raise ValueError("score: the seeds of a row were evaluated on different sites")
+    return metrics.score_interval(by_site, None if plans is None else metrics.plans_of_sites(plans, weights))
+
+
+def named(name: str, value: float, low: float, high: float) -> dict[str, float]:
+    """A value and its interval under the names that tables give them."""
+    return {name: value, f"{name}_low": low, f"{name}_high": high}
 
 
 FRONT = ("scalarized", "hypervolume", "sparsity", "expected_utility", "cardinality")
@@ -84,11 +129,14 @@ def numbers(objectives) -> list[str]:
     return [*FRONT, *GAINS, *responses, "sd_over_episodes"]
 
 
-def row_of_runs(key: tuple, evaluations: list, objectives=("carbon", "thaw")) -> dict:
+def row_of_runs(key: tuple, replicates: list, objectives=("carbon", "thaw")) -> dict:
     """A row: statistics over training seeds, of the evaluation and the gains of each."""
-    table = pd.DataFrame([run_metrics(*one) for one in evaluations], columns=numbers(objectives))
+    rows = [run_metrics(one.evaluation, one.gains) for one in replicates]
+    table = pd.DataFrame(rows, columns=numbers(objectives))
     row = row_of(key, len(table)) | over_seeds(table.drop(columns="sd_over_episodes"))
-    return row | {"sd_over_episodes": table.sd_over_episodes.mean()}
+    row |= scores(replicates) | {"sd_over_episodes": table.sd_over_episodes.mean()}
+    policies = {run.primary for one in replicates for run in one.runs}
+    return row | {"primary": " and ".join(sorted(policies))}
 
 
 def paper_rows() -> pd.DataFrame:
@@ -108,30 +156,31 @@ def paper_rows() -> pd.DataFrame:
 
 
 def constant_plans(results) -> dict[tuple, list]:
-    """Rows of the constant plans: (name, environment, setting) -> its evaluation and gains."""
-    plans = results.study("constant_plans")
+    """Rows of the constant plans: (name, environment, setting) -> its evaluation, as a replicate without a run."""
+    plans = results.constant_plans
     rows = {}
     for env_id in ENVIRONMENTS:
         for name, (_, best) in CONSTANT_PLANS.items():
             key = name, env_id, "default"
             rows[key] = []
             if plans is not None:
-                evaluation = as_evaluation(plans[plans.env_id == env_id], evaluation_weights(2), best)
-                rows[key] = [(evaluation, results.gains(evaluation, env_id))]
+                of_env = plans[plans.env_id == env_id]
+                evaluation = as_evaluation(of_env, evaluation_weights(2), best)
+                rows[key] = [results.replicate([], evaluation, dict.fromkeys(protocol.POLICIES, evaluation), env_id)]
     return rows
 
 
 def make(results) -> pd.DataFrame:
     """One row per script, environment and setting, those trained on the asymmetric reward in generalist mode."""
-    evaluations = {
-        key: [(one.evaluation, one.gains) for one in replicates]
-        for key, replicates in results.rows.items()
+    replicates = {
+        key: its_replicates
+        for key, its_replicates in results.rows.items()
         if key[1] in ENVIRONMENTS and "thaw_formulation" not in key[2]
     }
-    evaluations |= constant_plans(results)
+    replicates |= constant_plans(results)
     published, rows = paper_rows(), []
-    for key in sorted(evaluations, key=lambda key: ENVIRONMENTS.index(key[1])):
-        row = row_of_runs(key, evaluations[key])
+    for key in sorted(replicates, key=lambda key: ENVIRONMENTS.index(key[1])):
+        row = row_of_runs(key, replicates[key])
         if results.paper_name(key) in published.index:
             row |= published.loc[results.paper_name(key)].to_dict()
         rows.append(row)

@@ -21,13 +21,16 @@ def columns_of(headings: dict[str, str], objectives) -> dict[str, str]:
 
 def main_table(rows: dict, objectives) -> tuple[pd.DataFrame, dict]:
     """The metrics, a row a script and setting, and its columns."""
-    table = pd.DataFrame(
-        [
-            main_results.row_of_runs(key, [(one.evaluation, one.gains) for one in replicates], objectives)
-            for key, replicates in rows.items()
-        ]
+    table = pd.DataFrame([main_results.row_of_runs(key, replicates, objectives) for key, replicates in rows.items()])
+    shared = (
+        "primary",
+        "score_greedy",
+        "score_sampled",
+        "seeds_to_tell",
+        "sd_over_episodes",
+        *main_results.FRONT,
+        *main_results.GAINS,
     )
-    shared = ("sd_over_episodes", *main_results.FRONT, *main_results.GAINS)
     columns = {name: text for name, text in main_results.COLUMNS.items() if name in shared}
     return table, ROW_COLUMNS | columns | columns_of(RESPONSES, objectives)
 

@@ -8,12 +8,13 @@ on `run.make_envs()`, logs rows, saves checkpoints and shows `Progress` meanwhil
 from cleanrl_style.protocol.agents import load_agent
 from cleanrl_style.protocol.arguments import LIMITS, MAX_ENVS, fail, make_task, not_default, parse
 from cleanrl_style.protocol.compilation import compile_physics
-from cleanrl_style.protocol.evaluation import FIRST_EVALUATION_SEED, POLICIES, evaluate
+from cleanrl_style.protocol.evaluation import POLICIES, evaluate
 from cleanrl_style.protocol.files import replacing
 from cleanrl_style.protocol.flat import flat_parameters
 from cleanrl_style.protocol.fronts import scalarize
 from cleanrl_style.protocol.progress import Progress
 from cleanrl_style.protocol.run_folder import FLOAT_FORMAT, TIMING_COLUMNS, Run
+from cleanrl_style.protocol.sites import FIRST_EVALUATION_SEED, evaluation_seeds
 from cleanrl_style.protocol.task import EPISODE_INFO, Task, final_info
 from sim.task.preference import observed_weights
 
@@ -30,6 +31,7 @@ __all__ = [
     "Task",
     "compile_physics",
     "evaluate",
+    "evaluation_seeds",
     "fail",
     "final_info",
     "flat_parameters",

@@ -11,8 +11,8 @@ import numpy as np
 import tyro
 
 import boreal_env
-from cleanrl_style.protocol.evaluation import FIRST_EVALUATION_SEED
 from cleanrl_style.protocol.fronts import evaluation_weights
+from cleanrl_style.protocol.sites import FIRST_EVALUATION_SEED, evaluation_seeds
 from cleanrl_style.protocol.task import Task
 
 MAX_ENVS = 1000
@@ -118,6 +118,8 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
 
     with refusing("--eval-weights"):
         weights = [tuple(task.check_weights(value)) for value in args.eval_weights]
+    with refusing("--eval-episodes"):
+        evaluation_seeds(task, args.eval_episodes)
     if not weights or len(set(weights)) < len(weights):
         fail("--eval-weights must name at least one weight, and none twice")
     if hasattr(args, "rollout_steps") and args.rollout_steps % args.num_envs:

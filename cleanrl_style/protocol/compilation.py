@@ -1,7 +1,8 @@
-"""The physics is compiled when a machine first needs it: for all that a command needs at once, with a sign of life."""
+"""The physics is compiled when a machine first needs it: what is needed now with a sign of life, the rest meanwhile."""
 
 import contextlib
 import multiprocessing
+import os
 import signal
 import threading
 import time
@@ -10,34 +11,48 @@ from collections.abc import Iterable
 from sim.block import is_compiled, kernel
 
 INTERVAL = 5.0  # seconds between signs of life
+_UNDER_WAY: dict[int, multiprocessing.Process] = {}  # by lanes, what is compiled in the background
 
 
-def compile_physics(lanes: Iterable[int]) -> None:
-    """Have kernels for so many lanes ready on disk, compiled at the same time, and the first of them in this process.
+def compile_physics(lanes: Iterable[int], later: Iterable[int] = ()) -> None:
+    """Have kernels for so many lanes ready on disk, the first of them in this process.
 
-    Before worker processes are forked, this saves each of them the loading. Says nothing where all are there.
+    later : of kernels that are needed later: compiled in the background once the first are there, so that the command
+    goes on. Before worker processes are forked, all this saves each of them the loading. Says nothing where all are
+    there.
     """
     first, *others = dict.fromkeys(lanes)
-    missing = [number for number in others if not is_compiled(number)]
-    if is_compiled(first) and not missing:
+    complete = all(map(is_compiled, (first, *others)))
+    for number in others:
+        begin(number)
+    with (
+        contextlib.nullcontext() if complete else alive("compiling the physics, once for this processor: half a minute")
+    ):
+        finish(first)
         kernel(first)
-        return
-    helpers = [multiprocessing.Process(target=compile_apart, args=(number,), daemon=True) for number in missing]
-    try:
-        for helper in helpers:
-            helper.start()
-        with alive("compiling the physics, once for this processor: half a minute or more"):
-            kernel(first)
-            for helper in helpers:
-                helper.join()
-    finally:
-        for helper in helpers:
-            helper.kill()
+        for number in others:
+            finish(number)
+    for number in dict.fromkeys(later):
+        begin(number)
+
+
+def begin(lanes: int) -> None:
+    """Compile in the background, if it is neither there nor under way."""
+    if lanes not in _UNDER_WAY and not is_compiled(lanes):
+        _UNDER_WAY[lanes] = multiprocessing.Process(target=compile_apart, args=(lanes,), daemon=True)
+        _UNDER_WAY[lanes].start()
+
+
+def finish(lanes: int) -> None:
+    """Wait for what is compiled in the background."""
+    if helper := _UNDER_WAY.pop(lanes, None):
+        helper.join()
 
 
 def compile_apart(lanes: int) -> None:
-    """Compile in a process of its own, which leaves Ctrl-C to the main one."""
+    """Compile in a process of its own, which leaves Ctrl-C to the main one, and the processor to who needs it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(5)
     kernel(lanes)
 
 

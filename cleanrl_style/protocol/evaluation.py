@@ -1,6 +1,7 @@
 """The evaluation protocol: every method on the same episodes, every weight on the same sites and weathers."""
 
 import contextlib
+import math
 
 import gymnasium as gym
 import numpy as np
@@ -10,13 +11,14 @@ import boreal_env
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.fronts import return_columns, weight_columns
 from cleanrl_style.protocol.progress import Progress
+from cleanrl_style.protocol.sites import evaluation_seeds
 from cleanrl_style.protocol.task import Task, as_option, final_info
 from sim.block import lanes_for
 from sim.stands import available_cores
 
 POLICIES = ("greedy", "sampled")
-# Training uses seeds below this one, evaluation from this one on: the same for every method.
-FIRST_EVALUATION_SEED = 1_000_000_000
+# The policy that results are about: one acts by it, and no exploration is left in it (docs/decisions.md, 64).
+PRIMARY = "greedy"
 # Stands stepped in one call: enough to fill eight cores' blocks of 16, and a bound on the memory.
 CHUNK = 128
 
@@ -86,8 +88,11 @@ def choose_actions(probabilities: np.ndarray, uniforms: np.ndarray | None) -> np
     return (cumulative <= (uniforms * cumulative[:, -1])[:, None]).sum(axis=1)
 
 
-def play(task: Task, envs, policy, weights: np.ndarray, seeds: list[int], greedy: bool):
-    """One episode in each environment, under weights (n, m); its returns (n, m), and what each reported at its end."""
+def play(task: Task, envs, policy, weights: np.ndarray, seeds: list[int], greedy: np.ndarray):
+    """One episode in each environment, under weights (n, m), by the most probable actions where `greedy` (n,) is true.
+
+    Returns the episodes' returns (n, m), and what each reported at its end.
+    """
     # One stream of uniform numbers an episode, whatever the chunk, the weight and the method.
     generators = [np.random.default_rng([seed, 1]) for seed in seeds]
     observations, _ = envs.reset(seed=seeds, options={"preference": as_option(weights)})
@@ -96,8 +101,9 @@ def play(task: Task, envs, policy, weights: np.ndarray, seeds: list[int], greedy
     while playing.any():
         observations = observations.astype(np.float32)
         probabilities = policy(observations, task.action_masks(envs, observations), returns)
-        uniforms = None if greedy else np.array([generator.random() for generator in generators])
-        actions = choose_actions(probabilities, uniforms)
+        uniforms = np.array([generator.random() for generator in generators])
+        drawn = choose_actions(probabilities, uniforms)
+        actions = np.where(greedy, choose_actions(probabilities, None), drawn)
         observations, rewards, terminations, truncations, infos = envs.step(actions)
         returns[playing] += rewards[playing]
         ended = playing & (terminations | truncations)
@@ -121,47 +127,69 @@ def episodes_by_policy(task: Task, episodes: int, policies=POLICIES) -> dict[str
 
 def lanes_of_evaluation(task: Task, weights: int, episodes: int, policies=POLICIES) -> set[int]:
     """Lanes of the kernels that an evaluation needs, of so many weights."""
-    jobs = [weights * number for number in episodes_by_policy(task, episodes, policies).values()]
-    stands = {size for number in jobs for size in (min(number, CHUNK), number % CHUNK) if size}
-    return {lanes_for(size if task.has_lockstep else 1, available_cores()) for size in stands}
+    return lanes_of(task, weights * sum(episodes_by_policy(task, episodes, policies).values()))
 
 
-def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES):
+def lanes_of(task: Task, number: int) -> set[int]:
+    """Lanes of the kernels that so many episodes need."""
+    return {lanes_for(len(chunk) if task.has_lockstep else 1, available_cores()) for chunk in chunks(number)}
+
+
+def chunks(number: int) -> list[range]:
+    """Episodes that are stepped in one call each: all of nearly the same size, so that one kernel does."""
+    size = math.ceil(number / math.ceil(number / CHUNK))
+    return [range(first, min(first + size, number)) for first in range(0, number, size)]
+
+
+def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, split: str = "test"):
     """Evaluate a policy: every weight on the same episodes, by its most probable actions and by sampled ones.
 
     policy : a function of observations (n, d) float32, masks (n, 25) bool and accrued returns (n, m), giving action
-    probabilities (n, 25). weights : each a number (of two objectives, the first's weight) or m numbers.
+    probabilities (n, 25). weights : each a number (of two objectives, the first's weight) or m numbers. episodes : the
+    first of a split's sites (`sites.evaluation_seeds`).
     Returns the table of episodes (`evaluation_columns`; with a thaw formulation other than asymmetric also ASYMMETRIC)
     and the statistics of the annual record over the episodes of each weight (None if there is no such record).
     """
     weights = [task.check_weights(value) for value in weights]
     numbers = episodes_by_policy(task, episodes, policies)
+    seeds = evaluation_seeds(task, episodes, split)
     if task.boreal:
         compile_physics(lanes_of_evaluation(task, len(weights), episodes, policies))
-    progress = Progress("evaluation", sum(numbers.values()) * len(weights), "episodes")
     other_formulation = (ASYMMETRIC,) if "thaw" in task.objectives and task.thaw_formulation != "asymmetric" else ()
-    rows, years = [], []
-    for kind in policies:
-        jobs = [(k, episode) for k in range(len(weights)) for episode in range(numbers[kind])]
-        records = [[] for _ in weights]
-        for start in range(0, len(jobs), CHUNK):
-            chunk = jobs[start : start + CHUNK]
-            seeds = [FIRST_EVALUATION_SEED + episode for _, episode in chunk]
-            with contextlib.closing(make_envs(task, len(chunk))) as envs:
-                chunk_weights = np.array([weights[k] for k, _ in chunk])
-                returns, reports = play(task, envs, policy, chunk_weights, seeds, kind == "greedy")
-            for (k, episode), seed, its_returns, report in zip(chunk, seeds, returns, reports, strict=True):
-                if "years" in report:
-                    records[k].append(report.pop("years"))
-                if other_formulation:
-                    report[ASYMMETRIC] = asymmetric_thaw_return(records[k][-1])
-                score = task.returns_row(weights[k], its_returns)
-                rows.append({"policy": kind, "episode": episode, "seed": seed, **score, **report})
-            progress.show(len(rows))
-        for its_weights, record in zip(weights, records, strict=True):
-            if record:
-                years.append(summarize_years({"policy": kind, **task.weights_row(its_weights)}, record))
-    table = pd.DataFrame(rows, columns=(*evaluation_columns(task.objectives), *other_formulation))
+    # all policies and weights of a site side by side, so that it is spun up once
+    jobs = [
+        (kind, k, episode)
+        for episode in range(episodes)
+        for kind in policies
+        if episode < numbers[kind]
+        for k in range(len(weights))
+    ]
+    progress = Progress("evaluation", len(jobs), "episodes")
+    rows, records = {}, {(kind, k): [] for kind in policies for k in range(len(weights))}
+    for part in chunks(len(jobs)):
+        chunk = [jobs[number] for number in part]
+        its_weights = np.array([weights[k] for _, k, _ in chunk])
+        its_seeds = [seeds[episode] for *_, episode in chunk]
+        greedy = np.array([kind == "greedy" for kind, *_ in chunk])
+        with contextlib.closing(make_envs(task, len(chunk))) as envs:
+            returns, reports = play(task, envs, policy, its_weights, its_seeds, greedy)
+        for (kind, k, episode), seed, its_returns, report in zip(chunk, its_seeds, returns, reports, strict=True):
+            if "years" in report:
+                records[kind, k].append(report.pop("years"))
+            if other_formulation:
+                report[ASYMMETRIC] = asymmetric_thaw_return(records[kind, k][-1])
+            score = task.returns_row(weights[k], its_returns)
+            rows[kind, k, episode] = {"policy": kind, "episode": episode, "seed": seed, **score, **report}
+        progress.show(len(rows))
+    in_order = [
+        rows[kind, k, episode] for kind in policies for k in range(len(weights)) for episode in range(numbers[kind])
+    ]
+    years = [
+        summarize_years({"policy": kind, **task.weights_row(weights[k])}, record)
+        for (kind, k), record in records.items()
+        if record
+    ]
+    table = pd.DataFrame(in_order, columns=(*evaluation_columns(task.objectives), *other_formulation))
     return table, pd.concat(years, ignore_index=True) if years else None
 
 

@@ -58,9 +58,9 @@ def simplex_lattice(number: int, divisions: int) -> np.ndarray:
 
 
 def evaluation_weights(number: int) -> tuple:
-    """Weights of an evaluation: 11 for two objectives, as their first; 15 for three, 20 for four, each as a tuple."""
+    """Weights of an evaluation: 5 for two objectives, as their first; 15 for three, 20 for four, each as a tuple."""
     if number == 2:
-        return tuple(i / 10 for i in range(11))
+        return (0.0, 0.25, 0.5, 0.75, 1.0)
     return tuple(map(tuple, simplex_lattice(number, {3: 4, 4: 3}.get(number, 2)).tolist()))
 
 

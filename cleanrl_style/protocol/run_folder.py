@@ -23,9 +23,11 @@ import pandas as pd
 
 from cleanrl_style.protocol import tracking, training_envs
 from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, fail, not_default
-from cleanrl_style.protocol.evaluation import lanes_of_evaluation
+from cleanrl_style.protocol.evaluation import PRIMARY, lanes_of_evaluation
 from cleanrl_style.protocol.files import replacing
-from cleanrl_style.protocol.summary import draw_summary, print_table
+from cleanrl_style.protocol.reference import reference_returns
+from cleanrl_style.protocol.score import Comparison
+from cleanrl_style.protocol.summary import draw_summary, print_score, print_table
 from cleanrl_style.protocol.task import Task
 
 try:
@@ -96,6 +98,7 @@ class Run:
             "script": script,
             "arguments": {k: value for k, value in vars(args).items() if k not in FREE_ARGUMENTS},
             "not_default": changed,
+            "primary_policy": PRIMARY,
             "versions": versions(),
             "commit": commit(),
         }
@@ -273,16 +276,24 @@ class Run:
 
     def finish(self, evaluation: pd.DataFrame, years: pd.DataFrame | None) -> None:
         """Write the evaluation and the picture, print the table, and so declare the run finished."""
+        objectives, start = self.task.objectives, time.perf_counter()
+        plans = reference_returns(self.task, evaluation.seed.drop_duplicates().tolist())
+        comparison = None if plans is None else Comparison(evaluation, plans)
+        self.time("reference", 0, time.perf_counter() - start)
         with self._writing():
             if years is not None:
                 with replacing(self.folder / "evaluation_years.csv") as file:
                     years.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
             with replacing(self.folder / "summary.png") as file:
                 title = f"{self.script}, {self.args.env_id}, seed {self.args.seed}"
-                draw_summary(file, title, self.task.objectives, evaluation, years, self.folder / "episodes.csv")
+                episodes = self.folder / "episodes.csv"
+                draw_summary(file, title, objectives, evaluation, years, episodes, comparison)
             with replacing(self.folder / "evaluation.csv") as file:
                 evaluation.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
-        print_table(self.task.objectives, evaluation)
+        if comparison is None:
+            print_table(objectives, evaluation)
+        else:
+            print_score(objectives, comparison)
         print(f"{self.folder}: finished in {time.perf_counter() - self.start:.0f} s")
 
     @contextlib.contextmanager

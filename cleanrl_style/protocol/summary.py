@@ -3,19 +3,25 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from cleanrl_style.protocol import fronts
+from cleanrl_style.protocol.evaluation import POLICIES, PRIMARY
+from cleanrl_style.protocol.reference import NOTHING, title
+from cleanrl_style.protocol.score import Comparison, at_weights, by_weight, change, gain_hypervolume, gains
 
+SHOWN_WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of two objectives, where they were evaluated
+WIDTH = 11  # of a column
 COLOURS = ("tab:green", "tab:blue", "tab:orange", "tab:purple", "tab:brown", "tab:red")  # of objectives, in order
 
 
 def print_table(objectives, evaluation: pd.DataFrame) -> None:
-    """Mean returns per weight of the sampled and the greedy policy; metrics of the sampled one's front."""
+    """Mean returns per weight of both policies, of an environment where doing nothing is not known."""
     names = [*objectives, "scalarized"]
     weights, columns = fronts.weight_columns(objectives), [f"{name}_return" for name in names]
     means = evaluation.groupby(["policy", *weights])[columns].mean()
-    sampled, greedy = means.loc["sampled"], means.loc["greedy"]
+    first, second = (means.loc[policy] for policy in POLICIES)
     widths = [max(8, len(name) + 2) for name in names]
 
     def block(cells):
@@ -24,58 +30,145 @@ def print_table(objectives, evaluation: pd.DataFrame) -> None:
     def row(label, *rows):
         return label + "".join(block(f"{value:.2f}" for value in values) for values in rows)
 
-    episodes = (evaluation.policy == "sampled").sum() // len(sampled)
-    whose = objectives[0] if len(objectives) == 2 else ", ".join(objectives)
+    episodes = (evaluation.policy == POLICIES[0]).sum() // len(first)
     label = 6 * len(weights)
     print(f"\nMean returns of {episodes} evaluation episodes per weight")
     if len(objectives) > 2:
-        print(f"weights of {whose}")
-    above = "".join(f"{f'{kind} policy':^{sum(widths) + 1}}" for kind in ("sampled", "greedy"))
-    print(f"{whose if len(objectives) == 2 else '':{label}}{above}".rstrip())
+        print(f"weights of {', '.join(objectives)}")
+    above = "".join(f"{f'{policy} policy':^{sum(widths) + 1}}" for policy in POLICIES)
+    print(f"{objectives[0] if len(objectives) == 2 else '':{label}}{above}".rstrip())
     print(f"{'weight':{label}}{block(names)}{block(names)}")
-    for (key, one), (_, other) in zip(sampled.iterrows(), greedy.iterrows(), strict=True):
+    for (key, one), (_, other) in zip(first.iterrows(), second.iterrows(), strict=True):
         print(row("".join(f"{w:6.2f}" for w in (key if isinstance(key, tuple) else (key,))), one, other))
-    print(row(f"{'mean':>{label}}", sampled.mean(), greedy.mean()))
-    front = sampled[fronts.return_columns(objectives)].to_numpy()
+    print(row(f"{'mean':>{label}}", first.mean(), second.mean()) + "\n")
+
+
+def print_score(objectives, comparison: Comparison) -> None:
+    """Gains per weight beside what one can do without looking, the score, and how far the preference is followed."""
+    table, label = comparison.by_weight, 6 * len(fronts.weight_columns(objectives))
+    shown = [*POLICIES, "plus_100", "best"]
+    if len(objectives) == 2 and any(weight in table.index for weight in SHOWN_WEIGHTS):
+        chosen = table.index.isin(SHOWN_WEIGHTS)
+    else:
+        chosen = np.ones(len(table), dtype=bool)
+
+    def row(name, values, words=""):
+        return f"{name:>{label}}" + "".join(f"{value:>{WIDTH}.2f}" for value in values) + words
+
+    episodes = comparison.evaluation.seed.nunique()
+    scores = {name: f"{comparison.score(name):.0f}" for name in shown}
+    policies = ", ".join(f"{scores[policy]} {policy}" for policy in sorted(POLICIES, key=lambda name: name != PRIMARY))
+    print(f"\nSCORE {policies}: 0 is to do nothing, 100 the best that one can do without looking")
+    print(f"\nGain: reward of an episode above that of doing nothing, mean of {episodes} evaluation episodes")
+    whose = objectives[0] if len(objectives) == 2 else ""
+    if len(objectives) > 2:
+        print(f"weights of {', '.join(objectives)}")
+    heads = (whose, "agent,", "agent,", "100 stems", "best"), ("weight", *POLICIES, "a year", "constant")
+    for (first, *others), words in zip(heads, ("", "  plan, which is to"), strict=True):
+        print(f"{first:>{label}}" + "".join(f"{head:>{WIDTH}}" for head in others) + words)
+    for (key, values), plan, wanted in zip(table[shown].iterrows(), comparison.best_plans, chosen, strict=True):
+        if wanted:
+            name = "".join(f"{w:6.2f}" for w in (key if isinstance(key, tuple) else (key,)))
+            print(row(name, values, f"  {title(plan)}"))
+    print(row("mean", table[shown].mean()))
     print(
-        f"sampled policy: hypervolume {fronts.hypervolume(front):.2f} above "
-        f"{(fronts.REFERENCE_POINT,) * len(objectives)}, sparsity {fronts.sparsity(front):.3g}\n"
+        f"{'SCORE':>{label}}" + "".join(f"{value:>{WIDTH}}" for value in scores.values()) + "  % of the best constant"
+    )
+    if len(table) > 1:
+        print(followed(objectives, comparison))
+    hypervolumes = (f"{name} {gain_hypervolume(comparison.gains[name]):.2f}" for name in POLICIES)
+    print(
+        f"Hypervolume of the mean gains: {', '.join(hypervolumes)}; "
+        f"best constant plans {gain_hypervolume(comparison.gains['best']):.2f}\n"
     )
 
 
-def draw_summary(file, title: str, objectives, evaluation: pd.DataFrame, years: pd.DataFrame | None, episodes: Path):
-    """PNG of the learning curves and the trade-off; of a fixed strategy, its stand's years and episodes."""
+def followed(objectives, comparison: Comparison) -> str:
+    """How far the primary policy follows the preference, and how far the best constant plans do."""
+    first, last = comparison.weights[[0, -1], 0]
+    what = f"{objectives[0]} weight {first:g} to {last:g}" if len(objectives) == 2 else "own weight lowest to highest"
+    ours, best = (change(comparison.gains[name]) for name in (PRIMARY, "best"))
+    changes = (
+        f"{objective} {one:+.2f} (best plans {other:+.2f})"
+        for objective, one, other in zip(objectives, ours, best, strict=True)
+    )
+    return f"Following the preference, {what}: {', '.join(changes)}"
+
+
+def draw_summary(
+    file,
+    name: str,
+    objectives,
+    evaluation: pd.DataFrame,
+    years: pd.DataFrame | None,
+    episodes: Path,
+    comparison: Comparison | None,
+):
+    """PNG of the learning curves and of the evaluation; of a fixed strategy, its stand's years instead of the curves.
+
+    comparison : with what one can do without looking; None where that is not known.
+    """
     from matplotlib.figure import Figure
 
     learns = episodes.exists()
-    rows = math.ceil((len(objectives) + 2) / 2) if learns else 2
+    draws = [_draw_gains] if comparison is not None else []
+    draws += [_draw_trade_off if len(objectives) == 2 else _draw_parallel] if learns else [_draw_episodes]
+    used = (len(objectives) + 1 if learns else 3) + len(draws)
+    rows = math.ceil(used / 2)
     figure = Figure(figsize=(10, 3.5 * rows), layout="constrained")
-    figure.suptitle(title)
+    scores = (
+        ""
+        if comparison is None
+        else "\n" + ", ".join(f"{policy} score {comparison.score(policy):.0f}" for policy in POLICIES)
+    )
+    figure.suptitle(name + scores)
     axes = figure.subplots(rows, 2).ravel()
     if learns:
-        used = len(objectives) + 2
-        _draw_learning(axes[: used - 1], objectives, pd.read_csv(episodes))
-        draw = _draw_trade_off if len(objectives) == 2 else _draw_parallel
-        draw(figure, axes[used - 1], objectives, evaluation)
-        for ax in axes[used:]:
-            ax.set_axis_off()
+        _draw_learning(axes, objectives, pd.read_csv(episodes))
     else:
-        _draw_years(axes[:3], of_last_weights(years, objectives))
-        _draw_episodes(axes[3], objectives, of_last_weights(evaluation, objectives))
+        _draw_years(axes, of_last_weights(years, objectives))
+    for ax, draw in zip(axes[used - len(draws) :], draws, strict=False):
+        draw(figure, ax, objectives, evaluation if draw is not _draw_gains else comparison)
+    for ax in axes[used:]:
+        ax.set_axis_off()
     figure.savefig(file, format="png", dpi=120)
 
 
 def of_last_weights(table: pd.DataFrame, objectives) -> pd.DataFrame:
-    """Rows of the sampled policy at the last weights, in ascending order."""
+    """Rows of the primary policy at the last weights, in ascending order."""
     weights = fronts.weight_columns(objectives)
     last = table[weights].drop_duplicates().sort_values(weights).iloc[-1]
-    return table[(table.policy == "sampled") & (table[weights] == last).all(axis=1)]
+    return table[(table.policy == PRIMARY) & (table[weights] == last).all(axis=1)]
+
+
+def _draw_gains(figure, ax, objectives, comparison: Comparison) -> None:
+    """Scalarised gains by weight, beside those of what does not look."""
+    table = comparison.by_weight
+    x = table.index if len(objectives) == 2 else np.arange(len(table))
+    styles = {
+        "best": ("k:", "best constant plan of each weight (100)"),
+        "plus_100": ("k--", "100 stems a year"),
+        "greedy": ("o-", "greedy policy"),
+        "sampled": ("^-", "sampled policy"),
+    }
+    for name, (style, label) in styles.items():
+        ax.plot(x, table[name], style, markersize=5, label=label)
+    zero = comparison.plans[comparison.plans.plan == NOTHING]
+    for plan, rows in comparison.plans.groupby("plan"):
+        if not plan.isdigit():  # a fixed strategy, of the evaluation that ships
+            gained = by_weight(gains(at_weights(rows, comparison.weights), zero)).scalarized_return.mean()
+            ax.plot(x, gained, "--", color="0.7", linewidth=0.8, label=plan.replace("_", " "))
+    ax.axhline(0, color="black", linewidth=0.8)
+    ax.annotate("doing nothing (0)", (0.02, 0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8)
+    label = f"{objectives[0]} weight" if len(objectives) == 2 else "weight (number in the table)"
+    ax.set(xlabel=label, ylabel="scalarized gain", title="evaluation, gain over doing nothing")
+    ax.legend(fontsize=7)
 
 
 def _draw_learning(axes, objectives, episodes: pd.DataFrame) -> None:
     columns = [*fronts.return_columns(objectives), "scalarized_return"]
     colours = [COLOURS[k % len(COLOURS)] for k in range(len(objectives))] + ["black"]
-    for ax, column, colour in zip(axes, columns, colours, strict=True):
+    for ax, column, colour in zip(axes, columns, colours, strict=False):
         ax.plot(episodes.global_step, episodes[column], ".", markersize=1, color=colour, alpha=0.25)
         mean = episodes[column].rolling(100, min_periods=min(20, len(episodes))).mean()
         ax.plot(episodes.global_step, mean, color=colour, label="mean of the last 100 episodes")
@@ -90,7 +183,7 @@ def _draw_years(axes, years: pd.DataFrame) -> None:
         "conifer_fraction": "conifer fraction",
         "biomass_kgc_m2": "biomass (kgC/m2)",
     }
-    for ax, (variable, label) in zip(axes, labels.items(), strict=True):
+    for ax, (variable, label) in zip(axes, labels.items(), strict=False):
         rows = years[years.variable == variable]
         ax.fill_between(rows.year, rows.p10, rows.p90, alpha=0.3, label="80 % of the episodes")
         ax.plot(rows.year, rows["mean"], label="mean")
@@ -124,20 +217,21 @@ def _draw_trade_off(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
 
 
 def _draw_parallel(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
-    """A line per weight of the sampled policy's mean returns, in the colour of the objective that weighs most."""
+    """A line per weight of the primary policy's mean returns, in the colour of the objective that weighs most."""
     weights, returns = fronts.weight_columns(objectives), fronts.return_columns(objectives)
-    means = evaluation[evaluation.policy == "sampled"].groupby(weights)[returns].mean()
+    means = evaluation[evaluation.policy == PRIMARY].groupby(weights)[returns].mean()
     for its_weights, values in means.iterrows():
         heaviest = max(range(len(objectives)), key=lambda k: its_weights[k])
         ax.plot(range(len(objectives)), values, "o-", color=COLOURS[heaviest % len(COLOURS)], alpha=0.7)
     for k, name in enumerate(objectives):
         ax.plot([], [], "o-", color=COLOURS[k % len(COLOURS)], label=f"{name} weighs most")
     ax.set_xticks(range(len(objectives)), objectives)
-    ax.set(ylabel="mean return", title="evaluation, sampled policy, one line per weight")
+    ax.set(ylabel="mean return", title=f"evaluation, {PRIMARY} policy, one line per weight")
     ax.legend(fontsize=8)
 
 
-def _draw_episodes(ax, objectives, evaluation: pd.DataFrame) -> None:
+def _draw_episodes(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
+    evaluation = of_last_weights(evaluation, objectives)
     first, second = objectives[:2]
     x, y = evaluation[f"{second}_return"], evaluation[f"{first}_return"]
     ax.plot(x, y, ".", color="grey", label="episode")

@@ -29,6 +29,7 @@ class Task:
     boreal: bool = False  # ours, by whatever id: compiled physics, an annual record, a preference that can be fixed
     bare: bool = False  # ours itself, in no wrapper that does more than watch the order of calls
     has_lockstep: bool = False
+    draws_sites: bool = False  # a new site of ours in every episode
     masks: Callable | None = None  # valid actions as a function of observations; None: the environment is called
     site_entries: tuple[int, ...] = ()  # entries of the observation that are site parameters
     observes_preference: bool = True  # at the front of the observation, all weights but the last
@@ -60,6 +61,7 @@ class Task:
                 mode=one.mode.replace("_", "-"),
                 thaw_formulation=one.thaw_formulation,
                 years=one.years,
+                draws_sites=one.mode == "generalist" and one.site_seed is None,
                 masks=one.mask_function(),
                 observes_preference=all(name.startswith("preference") for name in front),
             )

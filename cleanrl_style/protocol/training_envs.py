@@ -107,7 +107,7 @@ def make_training_envs(
             env_kwargs["fixed_preference"] = as_option(task.preference)
         shared = [lanes_for(num_envs, available_cores())]
         apart = [lanes_for(len(streams), 1) for streams in blocks]
-        compile_physics([*(shared if vectorization == "lockstep" else apart), *lanes_later])
+        compile_physics(shared if vectorization == "lockstep" else apart, lanes_later)
     if vectorization == "lockstep":
         return task.make_lockstep(num_envs, **env_kwargs)
     make = [partial(make_env, task, blocks, worker, env_kwargs) for worker in range(len(blocks))]

@@ -1,0 +1,176 @@
+"""What one can do without looking: returns of every constant plan on an evaluation's episodes.
+
+A constant plan takes one action every year, wherever it can be carried out. The returns on the published sites ship
+with the code (analysis/reference_returns.py), under a fingerprint of the physics that they are of. Those of other
+episodes, of another environment or another physics are measured when they are first asked for.
+"""
+
+import ast
+import contextlib
+import functools
+import gzip
+import hashlib
+import io
+import json
+import tokenize
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import boreal_env
+from cleanrl_style.protocol.compilation import compile_physics
+from cleanrl_style.protocol.evaluation import chunks, lanes_of, make_envs, play
+from cleanrl_style.protocol.files import replacing
+from cleanrl_style.protocol.fronts import return_columns
+from cleanrl_style.protocol.progress import Progress
+from cleanrl_style.protocol.task import Task
+from sim.jit import cache_folder
+from sim.management import CONIFER_MIXES, DENSITY_CHANGES
+
+NOTHING = str(boreal_env.NO_CHANGE)
+PLUS_100 = "22"  # the paper's: half conifers
+# All actions but those four that do nothing, too.
+PLANS = (NOTHING, *(str(action) for action in range(25) if not 10 <= action < 15))
+FOLDER = "reference"
+FLOAT_FORMAT = "%.6g"
+
+
+def title(plan: str) -> str:
+    """A constant plan in words."""
+    change, mix = DENSITY_CHANGES[int(plan) // 5], CONIFER_MIXES[int(plan) % 5]
+    if not change:
+        return "nothing"
+    return f"{'plant' if change > 0 else 'cut'} {abs(change):.0f} a year, {100 * mix:.0f} % conifers"
+
+
+# ------------------------------------------------------------------------------------------------ of which physics
+
+
+def fingerprint(task: Task) -> str:
+    """Hash of all that a plan's returns depend on: environment, its arguments, source and tables of the simulator."""
+    arguments = {name: value for name, value in task.env_kwargs.items() if name != "observation_groups"}
+    of_all = (source(), task.env_id, sorted(arguments.items()))
+    return hashlib.sha256(repr(of_all).encode()).hexdigest()[:16]
+
+
+@functools.cache
+def source() -> str:
+    """Hash of source and tables of simulator and environment."""
+    simulator, digest = Path(str(files("sim"))), hashlib.sha256()
+    for path in [Path(boreal_env.__file__), *sorted(simulator.rglob("*.py"))]:
+        digest.update(bare(path.read_text(encoding="utf-8")).encode())
+    for path in sorted(simulator.rglob("*.csv")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def bare(source: str) -> str:
+    """Python source without comments, docstrings and empty lines."""
+    lines = source.splitlines()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node) is not None:
+            first, last = node.body[0].lineno, node.body[0].end_lineno
+            lines[first - 1 : last] = [""] * (last - first + 1)
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            line, column = token.start
+            lines[line - 1] = lines[line - 1][:column]
+    return "\n".join(line.rstrip() for line in lines if line.strip())
+
+
+# -------------------------------------------------------------------------------------------------- stored returns
+
+
+def write(path: Path, table: pd.DataFrame, physics: str) -> None:
+    """Write returns with the fingerprint of their physics; the same returns give the same bytes."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = f"# {json.dumps({'physics': physics})}\n" + as_text(table)
+    with replacing(path) as file, gzip.GzipFile("", "wb", 9, file, mtime=0) as packed:
+        packed.write(text.encode())
+
+
+def read(path) -> tuple[pd.DataFrame, str]:
+    """Stored returns, and the fingerprint of their physics."""
+    head, _, body = gzip.decompress(path.read_bytes()).decode().partition("\n")
+    return parse(body), json.loads(head.removeprefix("# "))["physics"]
+
+
+def as_text(table: pd.DataFrame) -> str:
+    """Returns as CSV, with as many digits as are kept."""
+    return table.to_csv(index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+
+
+def parse(text: str) -> pd.DataFrame:
+    """Returns of their CSV."""
+    return pd.read_csv(io.StringIO(text), dtype={"plan": str})
+
+
+def shipped(env_id: str):
+    """The file of an environment's returns on the published sites; it need not exist."""
+    return files("cleanrl_style.protocol") / FOLDER / f"{env_id}.csv.gz"
+
+
+# -------------------------------------------------------------------------------------------- asked for, measured
+
+
+def reference_returns(task: Task, seeds: list[int]) -> pd.DataFrame | None:
+    """Returns of every plan on the episodes with these seeds: plan, seed, a return for each objective.
+
+    None where the environment is not ours: what doing nothing is there is not known.
+    """
+    if not task.boreal:
+        return None
+    if task.mode == "site-specific":  # all episodes are one
+        table = known_or_measured(task, seeds[:1])
+        return pd.concat([table.assign(seed=seed) for seed in seeds], ignore_index=True)
+    return known_or_measured(task, seeds)
+
+
+def known_or_measured(task: Task, seeds: list[int]) -> pd.DataFrame:
+    """The returns that ship or that this machine has measured; else they are measured, and said to be."""
+    if task.env_id not in boreal_env.REGISTERED:  # its source may lie anywhere
+        print(f"constant plans in {task.env_id}, for the score (kept for environments of the project alone)")
+        return measure(task, seeds)
+    physics, file = fingerprint(task), shipped(task.env_id)
+    if file.is_file() and not set(task.env_kwargs) - {"observation_groups"}:
+        table, its_physics = read(file)
+        if its_physics == physics and set(seeds) <= set(table.seed):
+            return table[table.seed.isin(seeds)].reset_index(drop=True)
+        if its_physics != physics:
+            print("the constant plans' returns that ship are of another physics than this")
+    name = hashlib.sha256(repr((physics, seeds)).encode()).hexdigest()[:16]
+    path = cache_folder().parent / FOLDER / f"{task.env_id}-{name}.csv.gz"
+    if path.exists():
+        return read(path)[0]
+    print("constant plans on these episodes, for the score: played once, then kept")
+    table = measure(task, seeds)
+    try:
+        write(path, table, physics)
+    except OSError as error:
+        print(f"not kept: {path} ({error.strerror})")
+    return table
+
+
+def measure(task: Task, seeds: list[int]) -> pd.DataFrame:
+    """Play every constant plan on the episodes with these seeds."""
+    jobs = [(plan, seed) for seed in seeds for plan in PLANS]
+    compile_physics(lanes_of(task, len(jobs)))
+    progress, returns = Progress("constant plans", len(jobs), "episodes"), []
+    for numbers in chunks(len(jobs)):
+        chunk = [jobs[number] for number in numbers]
+        actions = np.array([int(plan) for plan, _ in chunk])
+        weights = np.full((len(chunk), task.num_objectives), 1 / task.num_objectives)
+
+        def policy(observations, masks, accrued_returns, actions=actions):
+            possible = masks[np.arange(len(actions)), actions]
+            return np.eye(25)[np.where(possible, actions, boreal_env.NO_CHANGE)]
+
+        with contextlib.closing(make_envs(task, len(chunk))) as envs:
+            greedy = np.ones(len(chunk), dtype=bool)
+            returns.append(play(task, envs, policy, weights, [seed for _, seed in chunk], greedy)[0])
+        progress.show(numbers.stop)
+    table = pd.DataFrame(jobs, columns=["plan", "seed"])
+    table[return_columns(task.objectives)] = np.concatenate(returns)
+    return parse(as_text(table))  # the same digits, stored or not

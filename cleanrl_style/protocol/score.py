@@ -1,0 +1,144 @@
+"""Gains over doing nothing, and the score: what share of the best constant plans' gain a policy has.
+
+A table of episodes has the columns of `evaluation.csv`: weights, seed, a return for each objective. One of plans
+(`reference.py`) has the column plan in place of weights.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from cleanrl_style.protocol.fronts import (
+    hypervolume,
+    objectives_of,
+    return_columns,
+    returns_of,
+    scalarize,
+    weight_columns,
+    weights_of,
+)
+from cleanrl_style.protocol.reference import NOTHING, PLUS_100
+
+
+def mean_scalarized(evaluation: pd.DataFrame) -> float:
+    """Scalarised return, averaged over weights and episodes."""
+    return float(scalarize(returns_of(evaluation), weights_of(evaluation)).mean())
+
+
+def by_weight(evaluation: pd.DataFrame):
+    """The evaluation grouped by weight: by one column of two objectives, else by one an objective."""
+    weights = weight_columns(objectives_of(evaluation.columns))
+    return evaluation.groupby(weights[0] if len(weights) == 1 else weights)
+
+
+def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame) -> pd.DataFrame:
+    """The evaluation with the returns of zero change on the same site and weather subtracted.
+
+    Raises ValueError if zero change was not evaluated on every one of the evaluation's seeds.
+    """
+    columns = return_columns(objectives_of(evaluation.columns))
+    reference = zero_change.drop_duplicates("seed").set_index("seed")[columns]
+    missing = sorted(set(evaluation.seed) - set(reference.index))
+    if missing:
+        raise ValueError(
+            f"zero change was not evaluated on the episode with seed {missing[0]} "
+            f"(nor on {len(missing) - 1} others); evaluate both with the same --eval-episodes"
+        )
+    difference = evaluation.copy()
+    difference[columns] -= reference.loc[evaluation.seed].to_numpy()
+    difference["scalarized_return"] = scalarize(returns_of(difference), weights_of(difference))
+    return difference
+
+
+def at_weights(episodes: pd.DataFrame, weights: np.ndarray) -> pd.DataFrame:
+    """Episodes of what does not look at the preference as an evaluation: once for each of the weights (k, m)."""
+    objectives, tables = objectives_of(episodes.columns), []
+    for one in weights:
+        columns = dict(zip(weight_columns(objectives), one, strict=len(objectives) != 2))
+        table = episodes.assign(**columns)
+        table["scalarized_return"] = scalarize(returns_of(table), one)
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
+
+
+def best_constant_plans(plans: pd.DataFrame, weights: np.ndarray) -> pd.DataFrame:
+    """At each of the weights (k, m) the constant plan with the highest mean scalarised return, as an evaluation.
+
+    The best is chosen on the very episodes that it is reported on, which flatters it a little.
+    """
+    constant = plans[plans.plan.str.isdigit()]
+    means = constant.groupby("plan")[return_columns(objectives_of(plans.columns))].mean()
+    best = [means.index[int(scalarize(means.to_numpy(), one).argmax())] for one in weights]
+    tables = [at_weights(plans[plans.plan == plan], [one]) for plan, one in zip(best, weights, strict=True)]
+    return pd.concat(tables, ignore_index=True)
+
+
+def score(gained: pd.DataFrame, best: pd.DataFrame) -> float:
+    """100 x the mean gain over that of the best constant plans; NaN where no constant plan gains anything.
+
+    gained, best : gains of a policy and of `best_constant_plans`, at the same weights. Both are averaged over the
+    weights first: at a single weight the best plan may be doing nothing.
+    """
+    ours, theirs = (np.unique(weights_of(table), axis=0) for table in (gained, best))
+    if not np.array_equal(ours, theirs):
+        raise ValueError("score: policy and constant plans have to be evaluated at the same weights")
+    whole = mean_scalarized(best)
+    return 100 * mean_scalarized(gained) / whole if whole > 0 else np.nan
+
+
+def front(gained: pd.DataFrame) -> np.ndarray:
+    """Mean gains of each weight, (k, m)."""
+    return by_weight(gained)[return_columns(objectives_of(gained.columns))].mean().to_numpy()
+
+
+def gain_hypervolume(gained: pd.DataFrame) -> float:
+    """Hypervolume of the mean gains above doing nothing."""
+    return hypervolume(front(gained), 0.0)
+
+
+def change(gained: pd.DataFrame) -> np.ndarray:
+    """How far each mean return goes from its lowest to its highest weight, (m,); of two, from the first's."""
+    weights, points = np.array([weights_of(table)[0] for _, table in by_weight(gained)]), front(gained)
+    changes = []
+    for k in range(points.shape[1]):
+        own = weights[:, 0 if points.shape[1] == 2 else k]
+        changes.append(points[own == own.max(), k].mean() - points[own == own.min(), k].mean())
+    return np.array(changes)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A policy's evaluation beside what one can do without looking; each as gains, under its name."""
+
+    evaluation: pd.DataFrame
+    plans: pd.DataFrame
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """Of the evaluation, (k, m), ascending."""
+        return np.unique(weights_of(self.evaluation), axis=0)
+
+    @cached_property
+    def gains(self) -> dict[str, pd.DataFrame]:
+        """Gains by name: each policy of the evaluation, `plus_100`, `best`."""
+        zero = self.plans[self.plans.plan == NOTHING]
+        tables = dict(tuple(self.evaluation.groupby("policy")))
+        tables["plus_100"] = at_weights(self.plans[self.plans.plan == PLUS_100], self.weights)
+        tables["best"] = best_constant_plans(self.plans, self.weights)
+        return {name: gains(table, zero) for name, table in tables.items()}
+
+    @cached_property
+    def by_weight(self) -> pd.DataFrame:
+        """Mean scalarised gain, a row a weight, a column a name."""
+        return pd.DataFrame({name: by_weight(table).scalarized_return.mean() for name, table in self.gains.items()})
+
+    @cached_property
+    def best_plans(self) -> list[str]:
+        """The best constant plan of each weight."""
+        return by_weight(self.gains["best"]).plan.first().tolist()
+
+    def score(self, name: str) -> float:
+        """The score of one of the names."""
+        return score(self.gains[name], self.gains["best"])

@@ -1,0 +1,35 @@
+"""The episodes of an evaluation: published sites, the same for every method, none of which a training has."""
+
+import csv
+import functools
+from importlib.resources import files
+
+from cleanrl_style.protocol.task import Task
+
+# Training resets environments with seeds below this one, evaluation from this one on.
+FIRST_EVALUATION_SEED = 1_000_000_000
+SPLITS = ("test", "validation")  # results are of the first; variants and budgets are chosen on the second
+TABLE = "evaluation_sites.csv"  # written by analysis/choose_sites.py
+
+
+@functools.cache
+def published_seeds(split: str) -> tuple[int, ...]:
+    """Seeds of a split's episodes, in an order of which every beginning is balanced."""
+    rows = csv.DictReader((files("cleanrl_style.protocol") / TABLE).read_text(encoding="utf-8").splitlines())
+    return tuple(int(row["seed"]) for row in rows if row["split"] == split)
+
+
+def evaluation_seeds(task: Task, episodes: int, split: str = "test") -> list[int]:
+    """What the environments of an evaluation are reset with, a seed an episode.
+
+    The first published sites where the task draws sites, else new weathers of its own site. Raises ValueError for an
+    unknown split, and for more episodes than a split has sites.
+    """
+    if split not in SPLITS:
+        raise ValueError(f"split {split!r}: allowed are {', '.join(SPLITS)}")
+    if not task.draws_sites:
+        return [FIRST_EVALUATION_SEED + episode for episode in range(episodes)]
+    seeds = published_seeds(split)
+    if episodes > len(seeds):
+        raise ValueError(f"{episodes} episodes: the {split} split has {len(seeds)} sites")
+    return list(seeds[:episodes])
