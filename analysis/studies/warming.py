@@ -219,7 +219,8 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         for name, row in last.iterrows()
     ]
     depths = "; ".join(
-        f"{name} {row['median']:+.2f} m ({row.low:+.2f} to {row.high:+.2f} on {row.sites:.0f} sites; {row.lost:.0f} lost)"
+        f"{name} {row['median']:+.2f} m ({row.low:+.2f} to {row.high:+.2f} on {row.sites:.0f} sites; "
+        f"{row.lost:.0f} lost)"
         for name, row in deeper.iterrows()
     )
     end = years.year.max()
@@ -227,18 +228,19 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         textwrap.fill(text, 120)
         for text in (
             f"*Written by `python analysis/studies/warming.py`.* Constant plans in the world of `boreal-balanced-v0`, "
-            f"without a scenario and under three, from {FIRST_YEAR} to {end}, on {sites} sites; what a scenario is, is in "
-            "[model.md](model.md), section 3.",
-            f"**At which warming does no plan keep the ground frozen?** Of the {sites} sites {today} have permafrost in "
-            f"the upper {NEAR_SURFACE_M:.0f} m in the first {LAST} years of today's climate. {sentence(years)} Where it "
-            f"stays, thaw is deeper by {end - LAST + 1}-{end}, no change under the scenario against none: {depths}.",
-            f"The models of CMIP6 lose {PUBLISHED_LOSS[0]:.0%} to {PUBLISHED_LOSS[1]:.0%} of the permafrost of the upper "
-            "3 m per K of the world, up to 3 K (IPCC AR6 WGI, section 9.5.2, after Burke et al. 2020, Cryosphere 14, "
-            "3155); Peng et al. (2023, Earth's Future 11) find thaw less than 30 % deeper by the end of the century for "
-            "most of it. Ours hangs on a boundary of fixed temperature at 12 m, which goes on taking up heat: below the "
-            "upper metres the ground warms less than it would.",
-            "**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of no change and of the best "
-            "plan for thaw alone, for both alike and for carbon alone; the share of sites whose best plan "
+            f"without a scenario and under three, from {FIRST_YEAR} to {end}, on {sites} sites; what a scenario is, "
+            "is in [model.md](model.md), section 3.",
+            f"**At which warming does no plan keep the ground frozen?** Of the {sites} sites {today} have permafrost "
+            f"in the upper {NEAR_SURFACE_M:.0f} m in the first {LAST} years of today's climate. {sentence(years)} "
+            f"Where it stays, thaw is deeper by {end - LAST + 1}-{end} (no change, under a scenario less without): "
+            f"{depths}.",
+            f"The models of CMIP6 lose {PUBLISHED_LOSS[0]:.0%} to {PUBLISHED_LOSS[1]:.0%} of the permafrost of the "
+            "upper 3 m per K of the world, up to 3 K (IPCC AR6 WGI, section 9.5.2, after Burke et al. 2020, Cryosphere "
+            "14, 3155); Peng et al. (2023, Earth's Future 11) find thaw less than 30 % deeper by the end of the century "
+            "for most of it. Ours hangs on a boundary of fixed temperature at 12 m, which goes on taking up heat: "
+            "below the upper metres the ground warms less than it would.",
+            "**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of no change and of the "
+            "best plan for thaw alone, for both alike and for carbon alone; the share of sites whose best plan "
             "for both is another one than without a scenario; and the share of years, of all plans, in which the thaw "
             "reward is clipped at -1.",
         )
