@@ -236,7 +236,7 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
             f"{depths}.",
             f"The models of CMIP6 lose {PUBLISHED_LOSS[0]:.0%} to {PUBLISHED_LOSS[1]:.0%} of the permafrost of the "
             "upper 3 m per K of the world, up to 3 K (IPCC AR6 WGI, section 9.5.2, after Burke et al. 2020, Cryosphere "
-            "14, 3155); Peng et al. (2023, Earth's Future 11) find thaw less than 30 % deeper by the end of the century "
+            "14, 3155); Peng et al. (2023, Earth's Future 11) find thaw less than 30 % deeper by the century's end "
             "for most of it. Ours hangs on a boundary of fixed temperature at 12 m, which goes on taking up heat: "
             "below the upper metres the ground warms less than it would.",
             "**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of no change and of the "
