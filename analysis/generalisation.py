@@ -3,8 +3,8 @@
 The ratios are those of Teoh, Varakantham and Vamplew (2025, ICLR, "On generalization across environments in
 multi-objective reinforcement learning"): NHGR is the hypervolume of a policy's front over that of the site's best known
 front, EUGR the same of the expected utility, each at most 1. Returns are first scaled per site and objective, the
-lowest of all fronts of the site to 0 and the highest to 1, and 0 is the reference point. One departure: theirs takes the
-expected utility of returns as they are; ours may be negative, where a ratio says nothing, so they are scaled for both.
+lowest of all fronts of the site to 0 and the highest to 1, and 0 is the reference point. One departure: theirs takes
+the expected utility of returns as they are; ours may be negative, where a ratio says nothing, so both take scaled ones.
 
 A table of fronts has a row a point: `site_seed` and a return of each objective (`carbon_return`, ..).
 """

@@ -8,6 +8,7 @@ of the first 50 years. Leaves results/studies/warming.csv, a row a scenario, sit
 scenario and year, docs/images/warming.png and docs/warming.md, which has it in words.
 """
 
+import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -204,7 +205,7 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
     sites = plans.site_seed.nunique()
     last = years[years.year > years.year.max() - LAST].groupby("scenario", sort=False).mean(numeric_only=True)
     lines = [
-        f"| {name} | {last.warming_k[name]:.1f} | {row.zero_carbon:.2f}, {row.zero_thaw:.2f} | "
+        f"| {name} | {row.zero_carbon:.2f}, {row.zero_thaw:.2f} | "
         + " | ".join(
             f"{plan_name(row[f'best_{w}'])}: {row[f'best_{w}_carbon']:.2f}, {row[f'best_{w}_thaw']:.2f}"
             for w in ("0", "0.5", "1")
@@ -218,42 +219,66 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         for name, row in last.iterrows()
     ]
     depths = "; ".join(
-        f"{name} {row['median']:+.2f} m ({row.low:+.2f} to {row.high:+.2f} on {row.sites:.0f} sites; {row.lost:.0f} lost)"
+        f"{name} {row['median']:+.2f} m ({row.low:+.2f} to {row.high:+.2f} on {row.sites:.0f} sites; "
+        f"{row.lost:.0f} lost)"
         for name, row in deeper.iterrows()
     )
-    return f"""# Warming
+    end = years.year.max()
+    wrapped = [
+        textwrap.fill(text, 120)
+        for text in (
+            f"*Written by `python analysis/studies/warming.py`.* Constant plans in the world of `boreal-balanced-v0`, "
+            f"without a scenario and under three, from {FIRST_YEAR} to {end}, on {sites} sites; what a scenario is, "
+            "is in [model.md](model.md), section 3.",
+            f"**At which warming does no plan keep the ground frozen?** Of the {sites} sites {today} have permafrost "
+            f"in the upper {NEAR_SURFACE_M:.0f} m in the first {LAST} years of today's climate. {sentence(years)} "
+            f"Where it stays, thaw is deeper by {end - LAST + 1}-{end} (no change, under a scenario less without): "
+            f"{depths}.",
+            f"The models of CMIP6 lose {PUBLISHED_LOSS[0]:.0%} to {PUBLISHED_LOSS[1]:.0%} of the permafrost of the "
+            "upper 3 m per K of the world, up to 3 K (IPCC AR6 WGI, section 9.5.2, after Burke et al. 2020, Cryosphere "
+            "14, 3155); Peng et al. (2023, Earth's Future 11) find thaw less than 30 % deeper by the century's end "
+            "for most of it. Ours hangs on a boundary of fixed temperature at 12 m, which goes on taking up heat: "
+            "below the upper metres the ground warms less than it would.",
+            "**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of no change and of the "
+            "best plan for thaw alone, for both alike and for carbon alone; the share of sites whose best plan "
+            "for both is another one than without a scenario; and the share of years, of all plans, in which the thaw "
+            "reward is clipped at -1.",
+        )
+    ]
+    of_ground = (
+        "scenario",
+        "warming [K]",
+        "frozen, no change",
+        "frozen under some plan",
+        "median thaw depth, no change [m]",
+        "permafrost of the upper 3 m lost, per K of the world",
+    )
+    of_returns = (
+        "scenario",
+        "no change",
+        "best for thaw",
+        "best for both",
+        "best for carbon",
+        "sites that change plan",
+        "clipped",
+    )
+    parts = [
+        "# Warming",
+        wrapped[0],
+        "![Fronts of constant plans, and the share of sites that stay frozen](images/warming.png)",
+        wrapped[1],
+        f"Of the {today} sites, in the mean of the last {LAST} years:",
+        "\n".join([*header(of_ground), *frozen]),
+        wrapped[2],
+        wrapped[3],
+        "\n".join([*header(of_returns), *lines]),
+    ]
+    return "\n\n".join(parts) + "\n"
 
-*Written by `python analysis/studies/warming.py`.* Constant plans in the world of `boreal-balanced-v0`, without a
-scenario and under three, from {FIRST_YEAR} to {years.year.max()}, on {sites} sites; what a scenario is, is in
-[model.md](model.md), section 3.
 
-![Fronts of constant plans, and the share of sites that stay frozen](images/warming.png)
-
-**At which warming does no plan keep the ground frozen?** Of the {sites} sites {today} have permafrost in the upper
-{NEAR_SURFACE_M:.0f} m in the first {LAST} years of today's climate. {sentence(years, today)} Where it stays, thaw gets deeper by
-2091-2100, zero change against zero change without a scenario: {depths}.
-
-Of the sites that start frozen, in the mean of the last {LAST} years:
-
-| scenario | warming [K] | frozen, no change | frozen under some plan | median thaw depth, no change [m] | permafrost of the \
-upper 3 m lost, per K of the world |
-|---|---|---|---|---|---|
-{chr(10).join(frozen)}
-
-The models of CMIP6 lose {PUBLISHED_LOSS[0]:.0%} to {PUBLISHED_LOSS[1]:.0%} of the permafrost in the upper 3 m per K of the world, up to 3 K
-(IPCC AR6 WGI, section 9.5.2, after Burke et al. 2020, Cryosphere 14, 3155); Peng et al. (2023, Earth's Future 11) find
-thaw less than 30 % deeper by the end of the century for most of it. Ours hangs on a boundary of fixed temperature at
-12 m, which goes on taking up heat: below the upper metres the ground warms less than it would.
-
-**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of no change and of the best plan for
-thaw alone, for both alike and for carbon alone; the share of sites whose best plan for both alike is another one than
-without a scenario; and the share of years, all plans, in which the thaw reward is clipped at -1.
-
-| scenario | warming by {years.year.max() - LAST + 1}-{years.year.max()} [K] | no change | best for thaw | best for both | best for carbon | \
-sites that change plan | clipped |
-|---|---|---|---|---|---|---|---|
-{chr(10).join(lines)}
-"""
+def header(names: tuple[str, ...]) -> list[str]:
+    """The first two lines of a Markdown table."""
+    return [f"| {' | '.join(names)} |", "|---" * len(names) + "|"]
 
 
 def loss(last: pd.DataFrame, scenario: str) -> str:
@@ -264,7 +289,7 @@ def loss(last: pd.DataFrame, scenario: str) -> str:
     return f"{share / make_scenarios.world_warming(scenario)[-LAST:].mean():.0%}"
 
 
-def sentence(years: pd.DataFrame, today: int) -> str:
+def sentence(years: pd.DataFrame) -> str:
     """The answer."""
     parts = []
     for column, who in (("frozen_unchanged", "without management"), ("frozen_any_plan", "under the best plan of each")):
