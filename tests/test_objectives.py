@@ -245,7 +245,7 @@ def test_an_objective_cannot_rewrite_the_record():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: quick(objectives=("carbon", "timber")), r"objective 'timber': allowed are carbon, thaw"),
+        (lambda: quick(objectives=("carbon", "wood")), r"objective 'wood': allowed are carbon, thaw"),
         (lambda: quick(objectives=()), r"objectives: .* got \(\)"),
         (lambda: quick(objectives="carbon"), r"objectives: .* got 'carbon'"),
         (lambda: quick(objectives=None), r"objectives: .* got None"),

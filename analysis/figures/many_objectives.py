@@ -56,7 +56,7 @@ def drawn(objectives, followers, fixed):
         names = [*objectives, "equal weights", *(["fixed strategy"] if references else [])]
         looks = [(colour, "-") for colour in COLOURS[: len(objectives)]] + [(EQUAL, "-"), (REFERENCE, "--")]
         handles = [Line2D([], [], color=colour, linestyle=style) for colour, style in looks[: len(names)]]
-        figure.legend(handles, names, loc="outside upper center", ncols=len(names))
+        figure.legend(handles, names, loc="outside upper center", ncols=3)
 
     return draw
 

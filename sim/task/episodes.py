@@ -24,7 +24,7 @@ from sim.task.objectives import (
 )
 from sim.task.observation import Moment, Table, observation_rows
 from sim.task.preference import check_weights, draw_weights, shown
-from sim.task.timber import TIMBER_COLUMNS, Timber, countries
+from sim.task.timber import TIMBER_COLUMNS, Timber, check_discount_rate, countries
 
 MODES = ("generalist", "site_specific")
 
@@ -96,6 +96,7 @@ class Episodes:
         self.own_objectives = [objective for objective in objectives if isinstance(objective, Objective)]
         if timber is None and TIMBER in objectives:
             raise ValueError(f"objective 'timber' needs prices: timber=, such as {', '.join(countries())}")
+        check_discount_rate(discount_rate)
         self.timber = None if timber is None else Timber(timber, discount_rate)
         self.history_names = (
             *HISTORY_NAMES,

@@ -44,10 +44,7 @@ class Timber:
     columns, or a dict of `ITEMS` in EUR; discount_rate : a year's. Raises ValueError naming what is wrong."""
 
     def __init__(self, timber, discount_rate):
-        number = isinstance(discount_rate, Real) and not isinstance(discount_rate, (bool, np.bool_))
-        if not number or not 0.0 <= discount_rate <= 0.2:
-            raise ValueError(f"discount_rate: a number in [0, 0.2] is allowed, got {discount_rate!r}")
-        self.discount_rate = float(discount_rate)
+        self.discount_rate = check_discount_rate(discount_rate)
         self.prices = read_prices(timber)
 
     def columns(self, record: dict[str, np.ndarray], year) -> dict[str, np.ndarray]:
@@ -71,6 +68,14 @@ class Timber:
 def timber_reward(year: dict[str, np.ndarray]) -> np.ndarray:
     """Discounted net revenue of the year over `TIMBER_SCALE`, so that the return is the net present value over it."""
     return year["discounted_revenue_eur_ha"] / TIMBER_SCALE
+
+
+def check_discount_rate(rate) -> float:
+    """A year's discount rate, 0.03 for 3 %."""
+    number = isinstance(rate, Real) and not isinstance(rate, (bool, np.bool_))
+    if not number or not 0.0 <= rate <= 0.2:
+        raise ValueError(f"discount_rate: a number in [0, 0.2] is allowed, got {rate!r}")
+    return float(rate)
 
 
 def shipped_rows() -> list[dict]:
