@@ -1,7 +1,7 @@
 """Sites outside the range that is sampled: how far a policy generalises, by one property at a time."""
 
+from sim.parameters import check_name
 from sim.spin_up import BOUNDARY
-from sim.task.checks import check_choice
 
 INSIDE = "inside"
 
@@ -23,5 +23,5 @@ def shifts_of(boundary: str = "sampled") -> tuple[str, ...]:
 
 def shifted(name: str, boundary: str = "sampled") -> dict:
     """Arguments of an environment for a shift, none for `INSIDE`: the same site seeds then give the shifted sites."""
-    check_choice("shift", name, (INSIDE, *shifts_of(boundary)))
+    check_name("shift", name, (INSIDE, *shifts_of(boundary)))
     return {} if name == INSIDE else {"parameter_overrides": dict(SHIFTS[name])}
