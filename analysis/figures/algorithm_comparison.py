@@ -20,15 +20,16 @@ from analysis.methods import LEARNERS, METHODS, STRATEGIES
 SIZE = (7, 5.6)
 SHOWN = (*LEARNERS, *STRATEGIES)
 CAPTION = (
-    f"Returns are sums over 50 years. (a) {SEEDS_95}. (b) thin bars: standard deviation over episodes, as in "
-    "the paper; dots: seeds. (c) a point a weight, mean over seeds. (d) large: mean over seeds, small: seeds."
+    f"Returns are sums over 50 years. (a) {SEEDS_95}. (b) 0: doing nothing, 100: the best constant plan of each "
+    "weight; left: greedy, right: sampled; dots: seeds. (c) a point a weight, mean over seeds. (d) large: mean over "
+    "seeds, small: seeds."
 )
 
 
 def draw(figure, results) -> None:
     """Learning curves, evaluation, trade-offs of all, the curriculum's trade-off."""
     learning, bars, trade_offs, curriculum = panels(
-        figure, 2, 2, ["training", "evaluation", "trade-offs", "Curriculum PPO by weight"]
+        figure, 2, 2, ["training", "score", "trade-offs", "Curriculum PPO by weight"]
     )
     for method in learners(learning, results):
         replicates = results.of("main", method.script)
@@ -37,15 +38,15 @@ def draw(figure, results) -> None:
 
     shown = [METHODS[script] for script in SHOWN if not wanting(bars, results, "main", script)]
     for k, method in enumerate(shown):
-        evaluations = [one.evaluation.scalarized_return for one in results.of("main", method.script)]
-        means = [values.mean() for values in evaluations]
-        bars.bar(k, np.mean(means), color=method.colour, alpha=0.6)
-        spread = np.mean([values.std() for values in evaluations])
-        bars.errorbar(k, np.mean(means), spread, color="black", linewidth=0.6)
-        bars.plot(np.full(len(means), k), means, "o", color="black", markersize=2)
+        replicates = results.of("main", method.script)
+        for offset, policy, opacity in ((-0.2, "greedy", 0.8), (0.2, "sampled", 0.4)):
+            scores = [one.score_of(one.by_policy.get(policy)) for one in replicates]
+            bars.bar(k + offset, np.mean(scores), 0.38, color=method.colour, alpha=opacity)
+            bars.plot(np.full(len(scores), k + offset), scores, "o", color="black", markersize=2)
     bars.set_xticks(range(len(shown)), [method.title for method in shown], rotation=40, ha="right")
-    bars.axhline(0, color="black", linewidth=0.5)
-    finish(bars, ylabel="mean scalarised return")
+    for level in (0, 100):
+        bars.axhline(level, color="black", linewidth=0.5)
+    finish(bars, ylabel="score")
 
     for script in SHOWN:
         if not wanting(trade_offs, results, "main", script):
