@@ -65,10 +65,10 @@ class Args:
     """factors of the rewards, before they are scalarised for training (None: 1 each)"""
 
     # Evaluation and output
-    eval_episodes: int = 100
-    """evaluation episodes per weight"""
+    eval_episodes: int = 200
+    """evaluation episodes per weight, each on a site of its own"""
     eval_weights: tuple[float, ...] | None = None
-    """carbon weights of the evaluation (None: 0 0.1 .. 1); of three and more objectives, as many numbers a weight"""
+    """carbon weights of the evaluation (None: 0 0.25 .. 1); of three and more objectives, as many numbers a weight"""
     run_dir: str | None = None
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False
