@@ -163,8 +163,8 @@ def constant_plans(results) -> dict[tuple, list]:
         for name, (_, best) in CONSTANT_PLANS.items():
             key = name, env_id, "default"
             rows[key] = []
-            if plans is not None:
-                of_env = plans[plans.env_id == env_id]
+            of_env = None if plans is None else plans[plans.env_id == env_id]
+            if of_env is not None and len(of_env):
                 evaluation = as_evaluation(of_env, evaluation_weights(2), best)
                 rows[key] = [results.replicate([], evaluation, dict.fromkeys(protocol.POLICIES, evaluation), env_id)]
     return rows
