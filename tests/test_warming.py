@@ -50,6 +50,21 @@ def test_deepening_is_of_sites_that_stay_frozen():
     assert found["median"].to_numpy() == pytest.approx(0.4) and (found.sites == 1).all() and (found.lost == 1).all()
 
 
+def test_the_ground_that_no_plan_keeps():
+    frozen = {"none": [(1, 1), (1, 1), (1, 1), (0, 1)]} | dict.fromkeys(
+        warming.SCENARIOS, [(1, 1), (0, 1), (0, 0), (0, 0)]
+    )
+    rows = [
+        (scenario, site, action, of_plans[k], -6.0 + 2.0 * site)
+        for scenario, sites in frozen.items()
+        for site, of_plans in enumerate(sites)
+        for k, action in enumerate((NO_CHANGE, 24))
+    ]
+    names = ["scenario", "site_seed", "action", "frozen_after_76", "deep_after_76_c"]
+    found = warming.lost_ground(pd.DataFrame(rows, columns=names)).loc["ssp245"]
+    assert found.to_dict() == {"sites": 3, "lost": 1, "saved": 1, "coldest_lost": -2.0, "warmest_kept": -4.0}
+
+
 def test_the_page_says_what_was_played(tmp_path):
     plans, years = warming.study(warming.Args(sites=2), 2, [NO_CHANGE, 24])
     assert len(plans) == 4 * 2 * 2 and len(years) == 4 * 2

@@ -192,6 +192,21 @@ def deepening(plans: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(found).T
 
 
+def lost_ground(plans: pd.DataFrame) -> pd.DataFrame:
+    """By scenario, of the sites frozen in the end without one: how many no plan keeps, how many some plan keeps
+    that no change does not, and the ground's temperature without one [degC], of the coldest lost and the warmest kept."""
+    frozen = plans.pivot(index=["scenario", "site_seed"], columns="action", values="frozen_after_76")
+    ground = plans[(plans.scenario == NONE) & (plans.action == boreal_env.NO_CHANGE)].set_index("site_seed")
+    ground = ground.deep_after_76_c[ground.frozen_after_76 == 1]
+    rows = {}
+    for scenario in SCENARIOS:
+        here = frozen.loc[scenario].loc[ground.index]
+        kept, unmanaged = here.max(axis=1) == 1, here[boreal_env.NO_CHANGE] == 1
+        rows[scenario] = {"sites": len(ground), "lost": (~kept).sum(), "saved": (kept & ~unmanaged).sum()}
+        rows[scenario] |= {"coldest_lost": ground[~kept].min(), "warmest_kept": ground[kept].max()}
+    return pd.DataFrame(rows).T
+
+
 def plan_name(action: int) -> str:
     """A plan in words."""
     change, mix = (float(value) for value in sim.management.decode(int(action)))
@@ -223,7 +238,14 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         f"{row.lost:.0f} lost)"
         for name, row in deeper.iterrows()
     )
+    lost = "; ".join(
+        f"{name} {row.lost:.0f} of {row.sites:.0f} (some plan keeps {row.saved:.0f} that no change loses)"
+        + (f", the coldest of {row.coldest_lost:.1f} °C" if row.lost else "")
+        + f", the warmest ground that is kept {row.warmest_kept:.1f} °C"
+        for name, row in lost_ground(plans).iterrows()
+    )
     end = years.year.max()
+    then = f"{end - LAST + 1}-{end}"
     wrapped = [
         textwrap.fill(text, 120)
         for text in (
@@ -231,8 +253,9 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
             f"without a scenario and under three, from {FIRST_YEAR} to {end}, on {sites} sites; what a scenario is, "
             "is in [model.md](model.md), section 3.",
             f"**At which warming does no plan keep the ground frozen?** Of the {sites} sites {today} have permafrost "
-            f"in the upper {NEAR_SURFACE_M:.0f} m in the first {LAST} years of today's climate. {sentence(years)} "
-            f"Where it stays, thaw is deeper by {end - LAST + 1}-{end} (no change, under a scenario less without): "
+            f"in the upper {NEAR_SURFACE_M:.0f} m in the first {LAST} years of today's climate. {sentence(years)} It "
+            f"hangs on how cold the ground is now. By {then} no plan keeps, of the sites frozen then without a "
+            f"scenario: {lost}. Where it stays, thaw is deeper by {then} (no change, under a scenario less without): "
             f"{depths}.",
             f"The models of CMIP6 lose {PUBLISHED_LOSS[0]:.0%} to {PUBLISHED_LOSS[1]:.0%} of the permafrost of the "
             "upper 3 m per K of the world, up to 3 K (IPCC AR6 WGI, section 9.5.2, after Burke et al. 2020, Cryosphere "
