@@ -191,7 +191,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `hwp_half_life_years`: half-life of wood products (None: for ever)
     - `harvest_min_class`: youngest class that may be cut: "young", "mature" or "old"
     - `reward`: a `Reward`, or a dict of the constants to change
-    - `balanced`: whether `carbon_scale`, unless `reward` gives it, is 0.92 (`boreal-balanced-v0`) instead of 2
+    - `balanced`: whether `carbon_scale`, unless `reward` gives it, is 0.93 (`boreal-balanced-v0`) instead of 2
     - `boundary`: "sampled" with the site, or "balanced" (`boreal-balanced-v0`): the temperature far below is the one
       at which no heat flows there under the site's own first stand, found by the spin-up, whatever the site's own.
       The observation shows it, and it may leave the sampled range of 268-272 K
