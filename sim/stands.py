@@ -51,7 +51,7 @@ class Stands:
     ----------
     number : stands.
     time_step_minutes : any divisor of a day's 1440 minutes.
-    backend : "numba", or "python" (the same source, interpreted).
+    backend : "numba", "python" (the same source, interpreted), or "cuda" (on a GPU, see `sim.cuda`).
     constants : literature constants to override, name -> value (see `sim/constants.csv`).
     mechanisms : switches, name -> bool (see `sim.parameters.MECHANISMS`).
     weather : of the generator: "paper", or "observed", with the daily variability of the records.
@@ -98,6 +98,11 @@ class Stands:
         self.products_decay = yearly_decay(hwp_half_life_years)
         self.threads = available_cores() if threads is None else _positive_integer("threads", threads)
         self.lanes = lanes_for(self.number, self.threads)
+        if backend == "cuda":
+            from sim import cuda  # only where it is wanted: it needs an extra
+
+            cuda.check_gpu()
+            self.lanes = cuda.STANDS
         self._pool = None
 
         self.parameters = np.zeros((self.number, len(PARAMETER_NAMES)))
@@ -267,7 +272,7 @@ class Stands:
             )
 
         chunks = blocks(len(stands), self.lanes)
-        if min(len(chunks), self.threads) == 1 or self.backend == "python":
+        if min(len(chunks), self.threads) == 1 or self.backend != "numba":
             for chunk in chunks:
                 run(chunk)
         else:
