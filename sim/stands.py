@@ -195,13 +195,11 @@ class Stands:
         """
         stands = np.arange(self.number) if stands is None else np.atleast_1d(np.asarray(stands, dtype=int))
         actions = check_actions(actions, len(stands))
-        draws = np.empty((len(stands), DRAWS_SIZE))
-        for k, stand in enumerate(stands):
+        for stand in stands:
             if self._weather[stand] is None:
                 raise RuntimeError(f"stand {stand} has not been started")
-            draws[k] = draw_year(self._weather[stand], self._disturbance[stand])
         rows = np.empty((len(stands), days, len(DAILY))) if daily else None
-        state, record = self._run(stands, draws, actions, observed, days, rows)
+        state, record = self._run(stands, None, actions, observed, days, rows)
         self._check(stands, state, record, "year")
         self.state[stands] = state
         self.record[stands] = record
@@ -250,17 +248,19 @@ class Stands:
         self._disturbance = [restored_generator(g) for g in state["disturbance"]]
 
     def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None, steps_per_day=None):
-        """The new states and records of a year, without touching anything: (stands, fields) each."""
+        """The new states and records of a year: (stands, fields) each. draws : of the year, (stands, fields), or None
+        to draw them, each thread those of its stands."""
         state = np.empty((len(stands), STATE_SIZE))
         record = np.empty((len(stands), len(RECORD)))
 
         def run(chunk):
             rows = None if daily is None else daily[chunk]
+            drawn = self._draw(stands[chunk]) if draws is None else draws[chunk]
             state[chunk], record[chunk] = run_block(
                 self.lanes,
                 self.parameters[stands[chunk]],
                 self.state[stands[chunk]],
-                draws[chunk],
+                drawn,
                 actions[chunk],
                 observed,
                 days,
@@ -280,6 +280,10 @@ class Stands:
                 self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="stands")
             list(self._pool.map(run, chunks))
         return state, record
+
+    def _draw(self, stands) -> np.ndarray:
+        """The random numbers of the stands' next year, (stands, fields)."""
+        return np.array([draw_year(self._weather[stand], self._disturbance[stand]) for stand in stands])
 
     def _check(self, stands, state, record, what) -> None:
         def describe(k):

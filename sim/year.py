@@ -41,7 +41,7 @@ def simulate_year(block, steps_per_day, days, observed, daily):
 
 @compiled
 def advance(b, hours, days, observed, daily):
-    """The year itself, which makes no array: a GPU has none to give. hours : `sim.forcing.hour_angles`, a row a step."""
+    """The year itself; it makes no array, which a GPU could not. hours : `sim.forcing.hour_angles`, a row a step."""
     steps_per_day = len(hours)
     seconds = SECONDS_PER_DAY / steps_per_day
     begin_year(b)

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -37,10 +36,10 @@ def compare(number, days, observed):
     )
     arguments = {"observed": weather.T if observed else None, "days": days, "daily": True}
     actions = np.arange(number) * 7 % 25
-    pairs = [*zip(expected.step(actions, **arguments), got.step(actions, **arguments)), (expected.state, got.state)]
-    for ours, theirs in pairs:
+    results = [(*stands.step(actions, **arguments), stands.state) for stands in (expected, got)]
+    for ours, theirs in zip(*results, strict=True):
         assert np.array_equal(np.isnan(ours), np.isnan(theirs))
-    print(max(np.nanmax(np.abs(b - a) / np.maximum(np.abs(a), 1e-6)) for a, b in pairs))
+    print(max(np.nanmax(np.abs(b - a) / np.maximum(np.abs(a), 1e-6)) for a, b in zip(*results, strict=True)))
 
 
 @pytest.mark.parametrize("case", CASES)
