@@ -3,8 +3,11 @@
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
+import numba
 import numpy as np
 import pytest
 
@@ -65,6 +68,25 @@ def test_a_lane_is_seen_where_it_lies():
                 values = whole[record][name]
                 np.testing.assert_array_equal(seen[record][name][..., 0], values[..., lane])
                 assert len(seen[record][name]) == (1 if values.ndim == 1 else len(values))
+
+
+@pytest.mark.skipif(find_spec("numba_cuda") is None, reason='needs the extra "cuda", and NVIDIA\'s compiler')
+def test_the_year_compiles_for_a_gpu(monkeypatch):
+    """Without a GPU, to PTX for an H100; no product is joined with a sum."""
+    monkeypatch.setattr("numba.cuda.dispatcher.get_current_device", lambda: SimpleNamespace(compute_capability=(9, 0)))
+    numbers, rows, forcing = (numba.types.Array(numba.float64, n, "C") for n in (1, 2, 3))
+    signature = numba.void(numbers, rows, rows, rows, rows, rows, numba.int64, forcing, rows, rows, rows)
+
+    def joined(a):
+        a[0] = a[0] * a[1] + a[2]
+
+    with cuda.our_arithmetic():
+        year = cuda.cuda.compile(
+            cuda.year_of(*cuda.device_functions()), signature, device=False, abi="numba", cc=(9, 0)
+        )[0]
+        apart = cuda.cuda.compile(joined, numba.void(numbers), device=False, abi="numba", cc=(9, 0))[0]
+    assert ".entry" in year and "div.rn.f64" in year
+    assert "mul.rn.f64" in apart and "fma" not in apart
 
 
 @pytest.mark.skipif(cuda.cuda.is_available(), reason="there is a GPU")
