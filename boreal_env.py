@@ -180,7 +180,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `mode`: "generalist" or "site_specific"
     - `years`: length of an episode (50)
     - `time_step_minutes`: any divisor of 1440 (30)
-    - `backend`: "numba" or "python" (the same source, interpreted)
+    - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (on a GPU, for thousands of stands)
     - `thaw_formulation`: "asymmetric", "contrast" or "raw_degree_days"
     - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one; of m objectives, not two, all m weights
     - `site_seed`: one site (`sim.sample_site(site_seed)`) instead of a new one each episode

@@ -72,6 +72,12 @@ def uncompiled(dispatcher: Dispatcher):
     return _copy(dispatcher, {}, lambda function, original: function)
 
 
+def translated(dispatcher: Dispatcher, translate):
+    """A copy of a compiled function and of all that it calls, each made by `translate` of a Python function and of the
+    compiled one that it comes from."""
+    return _copy(dispatcher, {}, translate)
+
+
 def _recompiled(function, original, name):
     function.__qualname__ = f"{function.__qualname__}_{name}"
     return compiled(function) if original.targetoptions.get("forceinline") else phase(function)

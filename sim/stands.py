@@ -54,7 +54,7 @@ class Stands:
     ----------
     number : stands.
     time_step_minutes : any divisor of a day's 1440 minutes.
-    backend : "numba", or "python" (the same source, interpreted).
+    backend : "numba", "python" (the same source, interpreted), or "cuda" (on a GPU, see `sim.cuda`).
     constants : literature constants to override, name -> value (see `sim/constants.csv`).
     mechanisms : switches, name -> bool (see `sim.parameters.MECHANISMS`).
     weather : of the generator: "paper", or "observed", with the daily variability of the records.
@@ -107,6 +107,11 @@ class Stands:
         self.products_decay = yearly_decay(hwp_half_life_years)
         self.threads = available_cores() if threads is None else _positive_integer("threads", threads)
         self.lanes = lanes_for(self.number, self.threads)
+        if backend == "cuda":
+            from sim import cuda  # only where it is wanted: it needs an extra
+
+            cuda.check_gpu()
+            self.lanes = cuda.STANDS
         self._pool = None
 
         self.parameters = np.zeros((self.number, len(PARAMETER_NAMES)))
@@ -218,13 +223,11 @@ class Stands:
         stands = np.arange(self.number) if stands is None else np.atleast_1d(np.asarray(stands, dtype=int))
         actions = check_actions(actions, len(stands))
         parameters = self.parameters_of_year(stands)
-        draws = np.empty((len(stands), DRAWS_SIZE))
-        for k, stand in enumerate(stands):
+        for stand in stands:
             if self._weather[stand] is None:
                 raise RuntimeError(f"stand {stand} has not been started")
-            draws[k] = draw_year(self._weather[stand], self._disturbance[stand])
         rows = np.empty((len(stands), days, len(DAILY))) if daily else None
-        state, record = self._run(stands, draws, actions, observed, days, rows, parameters=parameters)
+        state, record = self._run(stands, None, actions, observed, days, rows, parameters=parameters)
         self._check(stands, parameters, state, record, "year")
         self.state[stands] = state
         self.record[stands] = record
@@ -283,8 +286,9 @@ class Stands:
         self._disturbance = [restored_generator(g) for g in state["disturbance"]]
 
     def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None, steps_per_day=None, parameters=None):
-        """The new states and records of a year, without touching anything: (stands, fields) each.
+        """The new states and records of a year: (stands, fields) each.
 
+        draws : of the year, (stands, fields), or None to draw them, each thread those of its stands;
         parameters : of the year, (stands, fields), or None for those without a scenario.
         """
         parameters = self.parameters[stands] if parameters is None else parameters
@@ -293,11 +297,12 @@ class Stands:
 
         def run(chunk):
             rows = None if daily is None else daily[chunk]
+            drawn = self._draw(stands[chunk]) if draws is None else draws[chunk]
             state[chunk], record[chunk] = run_block(
                 self.lanes,
                 parameters[chunk],
                 self.state[stands[chunk]],
-                draws[chunk],
+                drawn,
                 actions[chunk],
                 observed,
                 days,
@@ -309,7 +314,7 @@ class Stands:
             )
 
         chunks = blocks(len(stands), self.lanes)
-        if min(len(chunks), self.threads) == 1 or self.backend == "python":
+        if min(len(chunks), self.threads) == 1 or self.backend != "numba":
             for chunk in chunks:
                 run(chunk)
         else:
@@ -317,6 +322,10 @@ class Stands:
                 self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="stands")
             list(self._pool.map(run, chunks))
         return state, record
+
+    def _draw(self, stands) -> np.ndarray:
+        """The random numbers of the stands' next year, (stands, fields)."""
+        return np.array([draw_year(self._weather[stand], self._disturbance[stand]) for stand in stands])
 
     def _check(self, stands, parameters, state, record, what) -> None:
         def describe(k):

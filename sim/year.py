@@ -11,7 +11,7 @@ from sim.demography import renew_stems, weigh_stems
 from sim.disturbance import insects
 from sim.forcing import hour_angles, site_angles, step_weather
 from sim.interception import unloading_rates
-from sim.jit import phase
+from sim.jit import compiled, phase
 from sim.management import manage
 from sim.organic import renew_organic_layer
 from sim.permafrost import add_upper_ground
@@ -37,10 +37,15 @@ def simulate_year(block, steps_per_day, days, observed, daily):
     shape (0, 6, lanes) for the weather generator.
     daily : output, an array of a record of `daily_dtype(lanes)` for each day, or of none.
     """
-    b = block[0]
-    begin_year(b)
+    advance(block[0], hour_angles(steps_per_day), days, observed, daily)
+
+
+@compiled
+def advance(b, hours, days, observed, daily):
+    """The year itself; it makes no array, which a GPU could not. hours : `sim.forcing.hour_angles`, a row a step."""
+    steps_per_day = len(hours)
     seconds = SECONDS_PER_DAY / steps_per_day
-    hours = hour_angles(steps_per_day)
+    begin_year(b)
     for day in range(days):
         today = observed[day * steps_per_day : (day + 1) * steps_per_day]
         begin_day(b, day, hours, today)

@@ -512,7 +512,7 @@ BAD = {
     "time step 7": ({"time_step_minutes": 7}, r"time_step_minutes = 7: a divisor of 1440"),
     "time step 0": ({"time_step_minutes": 0}, r"time_step_minutes: a positive integer is allowed, got 0"),
     "time step of float": ({"time_step_minutes": 30.0}, r"time_step_minutes: .*30.0"),
-    "unknown backend": ({"backend": "cuda"}, r"backend 'cuda': allowed are numba, python"),
+    "unknown backend": ({"backend": "gpu"}, r"backend 'gpu': allowed are numba, python, cuda"),
     "unknown output": ({"output": "weekly"}, r"output 'weekly': allowed are annual, daily"),
     "unknown stock": ({"initial": {"carbon": 1}}, r"unknown initial stock 'carbon'; allowed: density_stems_ha"),
     "negative stock": ({"initial": {"soil_kgc_m2": -1}}, r"initial soil_kgc_m2 = -1: a number in \[0, 100\]"),

@@ -69,6 +69,7 @@ class RecordedStands(sim.Stands):
     def _run(self, stands, draws, actions, *arguments, **options):
         """The year as `sim.Stands` runs it, after a first time that records its surface, unless its steps are other
         than the stands'."""
+        draws = self._draw(stands) if draws is None else draws
         if options.get("steps_per_day", self.steps_per_day) == self.steps_per_day:
             number = len(stands)
             block, _ = filled_block(

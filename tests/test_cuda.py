@@ -1,0 +1,96 @@
+"""The GPU's kernel: on numba's simulator it is the CPU's, to 1e-9; where NVIDIA's compiler is, it compiles."""
+
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from types import SimpleNamespace
+
+import numba
+import numpy as np
+import pytest
+
+import sim
+from sim import cuda
+from sim.state import DAYS, block_dtype
+
+MINUTES = 720
+#: stands (of which some are lanes of a second block), days, whether the weather is observed
+CASES = {"three days of two blocks": (34, 3, False), "a year": (1, DAYS, False), "observed days": (2, 4, True)}
+
+
+def start(number):
+    stands = sim.Stands(number, time_step_minutes=MINUTES)
+    fires = {"fire_base_probability": 0.05, "fire_drought_threshold": 0.0}
+    sites = [sim.sample_site(k, fires) for k in range(number)]
+    stands.start(np.arange(number), sites, [sim.episode_seeds(k) for k in range(number)])
+    return stands
+
+
+def compare(number, days, observed):
+    """Step stands on the CPU and on the simulated GPU; print the largest difference, relative from 1e-6 on."""
+    expected = start(number)
+    got = sim.Stands(number, time_step_minutes=MINUTES, backend="cuda")
+    got.set_state(expected.get_state())
+    hours = np.arange(days * 1440 // MINUTES)
+    weather = np.array(
+        [hours % 7 - 3.0, 0.8 - 0.01 * hours, 0.0 * hours + 3.0, 90.0 * (hours % 2), 250.0 + hours, hours]
+    )
+    arguments = {"observed": weather.T if observed else None, "days": days, "daily": True}
+    actions = np.arange(number) * 7 % 25
+    results = [(*stands.step(actions, **arguments), stands.state) for stands in (expected, got)]
+    for ours, theirs in zip(*results, strict=True):
+        assert np.array_equal(np.isnan(ours), np.isnan(theirs))
+    print(max(np.nanmax(np.abs(b - a) / np.maximum(np.abs(a), 1e-6)) for a, b in zip(*results, strict=True)))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_simulated_gpu_gives_what_the_cpu_gives(case):
+    """In a process of its own: numba decides at its import whether to simulate."""
+    root = Path(__file__).parents[1]
+    path = os.pathsep.join([str(root), str(root / "tests"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "PYTHONPATH": path}
+    code = f"import test_cuda; test_cuda.compare{CASES[case]}"
+    run = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, env=environment)
+    assert run.returncode == 0, run.stderr
+    assert float(run.stdout) <= 1e-9
+
+
+def test_a_lane_is_seen_where_it_lies():
+    """The numbers of every lane of a block, field by field, as its thread sees them."""
+    block = np.arange(cuda.BLOCK + cuda.WARP, dtype=float)
+    whole = block[: cuda.BLOCK].view(block_dtype(cuda.WARP))[0]
+    for lane in (0, 5, cuda.WARP - 1):
+        seen = block[lane : lane + cuda.BLOCK].view(cuda.LANE)[0]
+        for record in whole.dtype.names:
+            for name in whole[record].dtype.names:
+                values = whole[record][name]
+                np.testing.assert_array_equal(seen[record][name][..., 0], values[..., lane])
+                assert len(seen[record][name]) == (1 if values.ndim == 1 else len(values))
+
+
+@pytest.mark.skipif(find_spec("numba_cuda") is None, reason='needs the extra "cuda", and NVIDIA\'s compiler')
+def test_the_year_compiles_for_a_gpu(monkeypatch):
+    """Without a GPU, to PTX for an H100; no product is joined with a sum."""
+    monkeypatch.setattr("numba.cuda.dispatcher.get_current_device", lambda: SimpleNamespace(compute_capability=(9, 0)))
+    numbers, rows, forcing = (numba.types.Array(numba.float64, n, "C") for n in (1, 2, 3))
+    signature = numba.void(numbers, rows, rows, rows, rows, rows, numba.int64, forcing, rows, rows, rows)
+
+    def joined(a):
+        a[0] = a[0] * a[1] + a[2]
+
+    with cuda.our_arithmetic():
+        year = cuda.cuda.compile(
+            cuda.year_of(*cuda.device_functions()), signature, device=False, abi="numba", cc=(9, 0)
+        )[0]
+        apart = cuda.cuda.compile(joined, numba.void(numbers), device=False, abi="numba", cc=(9, 0))[0]
+    assert ".entry" in year and "div.rn.f64" in year
+    assert "mul.rn.f64" in apart and "fma" not in apart
+
+
+@pytest.mark.skipif(cuda.cuda.is_available(), reason="there is a GPU")
+def test_without_a_gpu_one_line_says_so():
+    with pytest.raises(ValueError, match=r"^backend 'cuda'.*$") as raised:
+        sim.Stands(1, backend="cuda")
+    assert "\n" not in str(raised.value)

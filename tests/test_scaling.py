@@ -1,0 +1,28 @@
+"""What `analysis/scaling.py` makes of its measurements. How fast anything is, is no test's business."""
+
+import numpy as np
+import pytest
+
+import sim
+from analysis import scaling
+from sim.task.actions import NO_CHANGE
+
+
+def test_a_row_a_figure_and_the_region_at_the_best_speed():
+    table = scaling.run(scaling.Args(stands=(1, 2), threads=(1,), environments=2, repeats=1, dollars_per_core_hour=0.5))
+    assert tuple(table.columns) == scaling.COLUMNS
+    table = table[table.backend == "numba"]
+    speeds = table[table.unit == "stand-years per s"]
+    assert speeds.stands.tolist() == [1, 2, 2]
+    assert (speeds.efficiency[speeds.what == "a year"] == 1.0).all()
+    hours, dollars = (table.loc[table.unit == unit, "median"].item() for unit in ("core-hours", "dollars"))
+    assert hours == pytest.approx(1e6 * 52 / speeds["median"][speeds.what == "a year"].max() / 3600)
+    assert dollars == 0.5 * hours
+
+
+def test_repeated_stands_go_on_as_those_they_repeat():
+    first = sim.Stands(2, time_step_minutes=1440)
+    first.start([0, 1], [sim.sample_site(k) for k in range(2)], [sim.episode_seeds(k) for k in range(2)])
+    five = scaling.repeated(first, 5, time_step_minutes=1440)
+    record = five.step(np.full(5, NO_CHANGE))
+    np.testing.assert_array_equal(record, first.step(np.full(2, NO_CHANGE))[[0, 1, 0, 1, 0]])
