@@ -7,7 +7,7 @@ from scripts import ROOT, run_script
 from cleanrl_style import protocol
 
 TOY = "toy_env:toy-v0"
-SCRIPTS = ("ppo_gated", "ppo_curriculum", "ppo_group", "eupg_var_lambda", "eupg_fixed_lambda")
+SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
 
 
 def train(path, folder):

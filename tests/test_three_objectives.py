@@ -78,7 +78,7 @@ def test_fixed_strategies_are_evaluated_too(script, tmp_path):
 def test_learning_follows_three_weights(tmp_path):
     """On the toy, whose best mixture for each weight is known."""
     corners = (1, 0, 0, 0, 1, 0, 0, 0, 1)
-    given = ("--env-id", "toy_env:toy-three-v0", "--total-timesteps", 8192, "--num-envs", 2, "--learning-rate", 3e-3)
+    given = ("--env-id", "toy_env:toy-three-v0", "--total-timesteps", 12288, "--num-envs", 2, "--learning-rate", 3e-3)
     run_script(
         "cleanrl_style/ppo_gated.py", *given, "--run-dir", tmp_path, "--eval-episodes", 2, "--eval-weights", *corners
     )
