@@ -20,7 +20,7 @@ class Replicate:
     runs: list[runs.Run]
     evaluation: pd.DataFrame
     gains: pd.DataFrame | None  # the evaluation less zero change on the same episodes, if that was evaluated
-    by_policy: dict[str, pd.DataFrame] = field(default_factory=dict)  # gains of each policy
+    by_policy: dict[str, pd.DataFrame | None] = field(default_factory=dict)  # gains of each policy
     plans: pd.DataFrame | None = None  # gains of the constant plans on its episodes, if they were evaluated
 
     def each_run(self) -> list["Replicate"]:
@@ -121,25 +121,18 @@ class Results:
         return not lacking
 
     def _replicate(self, _, its_runs) -> Replicate:
-        evaluation = pd.concat([run.evaluation for run in its_runs], ignore_index=True)
         conditions = {name: its_runs[0].arguments[name] for name in ("env_id", "thaw_formulation", "site_seed")}
         by_policy = {
             policy: pd.concat([run.of_policy(policy) for run in its_runs], ignore_index=True)
             for policy in protocol.POLICIES
         }
-        return self.replicate(its_runs, evaluation, by_policy, **conditions)
+        return self.replicate(its_runs, by_policy, its_runs[0].primary, **conditions)
 
-    def replicate(self, its_runs, evaluation, by_policy, env_id, **conditions) -> Replicate:
-        """A replicate of an evaluation, of the primary policy and of each, with its gains if they are known."""
-        gained = self.gains(evaluation, env_id, **conditions)
-        if gained is None:
-            return Replicate(its_runs, evaluation, None)
-        both = {
-            policy: self.gains(table, env_id, **conditions)
-            for policy, table in by_policy.items()
-            if len(table) == len(evaluation)
-        }
-        return Replicate(its_runs, evaluation, gained, both, self.plans(evaluation, env_id, **conditions))
+    def replicate(self, its_runs, by_policy, primary, env_id, **conditions) -> Replicate:
+        """A replicate of evaluations by policy, with its gains if they are known."""
+        gained = {policy: self.gains(table, env_id, **conditions) for policy, table in by_policy.items()}
+        plans = None if gained[primary] is None else self.plans(by_policy[primary], env_id, **conditions)
+        return Replicate(its_runs, by_policy[primary], gained[primary], gained, plans)
 
     def plans(self, evaluation, env_id, thaw_formulation="asymmetric", site_seed=None) -> pd.DataFrame | None:
         """Gains of the constant plans on an evaluation's episodes; None if they were not evaluated on them."""

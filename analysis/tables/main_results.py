@@ -13,6 +13,7 @@ from analysis import metrics
 from analysis.studies.constant_plans import ENVIRONMENTS, as_evaluation
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 from cleanrl_style import protocol
+from cleanrl_style.protocol.evaluation import PRIMARY
 from cleanrl_style.protocol.fronts import evaluation_weights
 
 TITLE = "Main results"
@@ -166,7 +167,7 @@ def constant_plans(results) -> dict[tuple, list]:
             of_env = None if plans is None else plans[plans.env_id == env_id]
             if of_env is not None and len(of_env):
                 evaluation = as_evaluation(of_env, evaluation_weights(2), best)
-                rows[key] = [results.replicate([], evaluation, dict.fromkeys(protocol.POLICIES, evaluation), env_id)]
+                rows[key] = [results.replicate([], dict.fromkeys(protocol.POLICIES, evaluation), PRIMARY, env_id)]
     return rows
 
 
