@@ -56,12 +56,6 @@ def run_block(
     stands, or None; daily : filled with the daily output (stands, days, columns), or None. Returns the new state and
     the annual record, (stands, fields) each, and touches nothing else.
     """
-    if backend == "cuda":
-        from sim.cuda import run_stands
-
-        choices = {"first_cut_age": first_cut_age, "products_decay": products_decay}
-        given = (parameters, state, draws, actions, observed, days, daily)
-        return run_stands(*given, steps_per_day=steps_per_day, **choices)
     number = len(parameters)
     if backend == "python":
         lanes = number  # interpreted, an idle lane takes as long as another

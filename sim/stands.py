@@ -6,7 +6,9 @@ threads. So any subset of stands can be stepped together, in any order, with the
 """
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from numbers import Real
 
 import numpy as np
@@ -107,11 +109,13 @@ class Stands:
         self.products_decay = yearly_decay(hwp_half_life_years)
         self.threads = available_cores() if threads is None else _positive_integer("threads", threads)
         self.lanes = lanes_for(self.number, self.threads)
+        self._run_block: Callable = partial(run_block, self.lanes, backend=backend)
         if backend == "cuda":
             from sim import cuda  # only where it is wanted: it needs an extra
 
             cuda.check_gpu()
             self.lanes = cuda.STANDS
+            self._run_block = cuda.run_stands
         self._pool = None
 
         self.parameters = np.zeros((self.number, len(PARAMETER_NAMES)))
@@ -298,8 +302,7 @@ class Stands:
         def run(chunk):
             rows = None if daily is None else daily[chunk]
             drawn = self._draw(stands[chunk]) if draws is None else draws[chunk]
-            state[chunk], record[chunk] = run_block(
-                self.lanes,
+            state[chunk], record[chunk] = self._run_block(
                 parameters[chunk],
                 self.state[stands[chunk]],
                 drawn,
@@ -308,7 +311,6 @@ class Stands:
                 days,
                 rows,
                 steps_per_day=steps_per_day or self.steps_per_day,
-                backend=self.backend,
                 first_cut_age=self.first_cut_age,
                 products_decay=self.products_decay,
             )
