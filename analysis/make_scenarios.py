@@ -72,7 +72,8 @@ def monthly_means(path: Path, years: tuple[int, int]) -> pd.DataFrame | None:
 
 
 def amplification(folder: Path) -> pd.DataFrame:
-    """By scenario, medians of boreal over global warming and of boreal warming's seasonal half-range over its mean."""
+    """By scenario, medians over the models of the world's warming [K], of boreal over global warming, and of boreal
+    warming's seasonal half-range over its mean."""
     season = np.cos(2.0 * np.pi * ((np.arange(12) + 0.5) * 365 / 12 - WARMEST_DAY) / 365)
     rows = []
     for past in sorted(folder.glob("CMIP6_*_historical_*.csv")):
@@ -85,10 +86,11 @@ def amplification(folder: Path) -> pd.DataFrame:
                 continue
             warming = after - before
             boreal = warming[REGIONS].mean(axis=1).to_numpy()
-            row = {"boreal": boreal.mean() / warming["world"].mean(), "season": 2 * (boreal * season).mean()}
-            rows.append({"scenario": scenario, "model": model, **row, "season": row["season"] / boreal.mean()})
-    models = pd.DataFrame(rows).groupby("scenario")
-    return models[["boreal", "season"]].median().assign(models=models.size())
+            world = warming["world"].mean()
+            half_range = 2.0 * (boreal * season).mean()
+            rows.append((scenario, world, boreal.mean() / world, half_range / boreal.mean()))
+    models = pd.DataFrame(rows, columns=["scenario", "world", "boreal", "season"]).groupby("scenario")
+    return models.median().assign(models=models.size())
 
 
 def world_warming(scenario: str) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Climate change: the published paths, a user's own, and what they do to a stand."""
 
+from pathlib import Path
+
 import gymnasium as gym
 import numpy as np
 import pandas as pd
@@ -7,6 +9,7 @@ import pytest
 from playing import NAN, quick, quick_vector
 
 import sim
+from analysis import make_scenarios
 from sim.scenario import COLUMNS, FIRST_YEAR
 from sim.task.episodes import BALANCED_WORLD
 
@@ -43,6 +46,16 @@ def test_the_paths_are_of_the_published_size():
         assert warming[0] < last.warming_k.mean() < warming[1]
         assert round(table.co2_ppm.iloc[-1]) == ppm
         assert (last.precipitation_factor.between(1.05, 1.35) & (last.warming_amplitude_k < 0.0)).all()
+
+
+def test_the_document_has_the_ratios_of_the_table():
+    ratios, amplitudes = [], []
+    for name, table in PATHS.items():
+        world = make_scenarios.world_warming(name)
+        ratios.append(f"{table.warming_k.sum() / world.sum():.2f}")
+        amplitudes.append(f"{table.warming_amplitude_k.sum() / table.warming_k.sum():.2f}")
+    text = " ".join((Path(sim.__file__).parent.parent / "docs" / "model.md").read_text(encoding="utf-8").split())
+    assert "(medians: {}, {} and {}; $w_A = {}$, ${}$ and ${}\\,w$".format(*ratios, *amplitudes) in text
 
 
 def test_a_stand_starts_in_the_first_year_of_a_path():

@@ -194,8 +194,7 @@ def deepening(plans: pd.DataFrame) -> pd.DataFrame:
 
 def lost_ground(plans: pd.DataFrame) -> pd.DataFrame:
     """By scenario, of the sites frozen in the end without one: how many no plan keeps, how many some plan keeps
-    that no change does not, and the ground's temperature without one [degC], of the coldest lost and the warmest
-    kept."""
+    that no change does not, and the ground's temperature without one [degC]: coldest lost, warmest kept."""
     frozen = plans.pivot(index=["scenario", "site_seed"], columns="action", values="frozen_after_76")
     ground = plans[(plans.scenario == NONE) & (plans.action == boreal_env.NO_CHANGE)].set_index("site_seed")
     ground = ground.deep_after_76_c[ground.frozen_after_76 == 1]
