@@ -17,12 +17,19 @@ from sim.ground_heat import ground_conductances, ground_temperatures
 from sim.jit import uncompiled
 from sim.organic import organic_capacities
 from sim.parameters import check_constants, check_mechanisms, check_weather
+from sim.scenario import WITHOUT_SCENARIO
 from sim.soil import enthalpy
 from sim.spin_up import INITIAL_RANGES, first_state
 from sim.state import DAYS, PARAMETER_NAMES, block_dtype, daily_dtype
 from sim.year import simulate_year
 
-PARAMETERS = {**sim.middle_site(), **check_constants(None), **check_mechanisms(None), **check_weather("paper")}
+PARAMETERS = {
+    **sim.middle_site(),
+    **check_constants(None),
+    **check_mechanisms(None),
+    **check_weather("paper"),
+    **WITHOUT_SCENARIO,
+}
 GROUND = Ground.of(PARAMETERS)
 YEAR = 2.0 * np.pi * np.arange(DAYS) / DAYS
 

@@ -31,13 +31,14 @@ def test_ids_of_the_benchmark():
 def test_an_environment_of_ours_under_another_id_loses_nothing(tmp_path, monkeypatch):
     """Annual record, compilation before workers, hidden site, lockstep with a preference: all without the id's help."""
     compiled = []
-    monkeypatch.setattr(training_envs, "compile_physics", compiled.extend)
+    monkeypatch.setattr(training_envs, "compile_physics", lambda lanes, later=(): compiled.append((lanes, later)))
     run_script(
         "cleanrl_style/eupg_fixed_lambda.py",
         *("--env-id", "short-v0", "--hide-site", "--vectorization", "lockstep", "--preference", 0.25),
         *("--num-envs", 2, "--total-timesteps", 12, "--eval-episodes", 2, "--run-dir", tmp_path),
     )
-    assert compiled == [lanes_for(2, available_cores())] * 2  # for the training, and for the evaluation
+    lanes = lanes_for(2, available_cores())
+    assert compiled == [([lanes], [lanes])]  # for the training, and for the evaluation
     years = pd.read_csv(tmp_path / "evaluation_years.csv")
     assert years.year.max() == 3 and "biomass_kgc_m2" in set(years.variable)
     episodes = pd.read_csv(tmp_path / "episodes.csv")
