@@ -37,8 +37,8 @@ def test_an_environment_of_ours_under_another_id_loses_nothing(tmp_path, monkeyp
         *("--env-id", "short-v0", "--hide-site", "--vectorization", "lockstep", "--preference", 0.25),
         *("--num-envs", 2, "--total-timesteps", 12, "--eval-episodes", 2, "--run-dir", tmp_path),
     )
-    lanes = lanes_for(2, available_cores())
-    assert compiled == [([lanes], [lanes])]  # for the training, and for the evaluation
+    training, evaluation = (lanes_for(stands, available_cores()) for stands in (2, 4))  # 4: under both policies
+    assert compiled == [([training], {evaluation})]
     years = pd.read_csv(tmp_path / "evaluation_years.csv")
     assert years.year.max() == 3 and "biomass_kgc_m2" in set(years.variable)
     episodes = pd.read_csv(tmp_path / "episodes.csv")
