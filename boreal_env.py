@@ -167,11 +167,12 @@ class BorealEnv(Described, gym.Env, EzPickle):
     ## Which Id
     `boreal-balanced-v0` is the task to study policies with: the ground below is in balance with the climate and the
     first stand above it, the soil's carbon with its litter, weather varies from day to day as on record, and both
-    returns vary equally between policies. `boreal-generalist-v0` and `boreal-site-specific-v0` are the paper's: use
-    them to compare with it. There the boundary's temperature is drawn without regard to the climate, and so which
-    site was drawn decides nearly all of the thaw return. `boreal-timber-v0` is the balanced task with a third
-    objective, timber at Finnish prices, `boreal-four-v0` with biodiversity as a fourth. `boreal-warming-v0` is it from
-    2025 on under the scenario SSP2-4.5: the ground starts in balance with the climate of 1995-2014, and warms.
+    returns vary equally between the policies worth choosing. `boreal-generalist-v0` and `boreal-site-specific-v0`
+    are the paper's: use them to compare with it. There the boundary's temperature is drawn without regard to the
+    climate, and so which site was drawn decides nearly all of the thaw return. `boreal-timber-v0` is the balanced
+    task with a third objective, timber at Finnish prices, `boreal-four-v0` with biodiversity as a fourth.
+    `boreal-warming-v0` is it from 2025 on under the scenario SSP2-4.5: the ground starts in balance with the
+    climate of 1995-2014, and warms.
 
     ## Episode Termination
     After 50 years the episode is terminated: nothing is worth anything beyond.
@@ -191,7 +192,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `hwp_half_life_years`: half-life of wood products (None: for ever)
     - `harvest_min_class`: youngest class that may be cut: "young", "mature" or "old"
     - `reward`: a `Reward`, or a dict of the constants to change
-    - `balanced`: whether `carbon_scale`, unless `reward` gives it, is 0.93 (`boreal-balanced-v0`) instead of 2
+    - `balanced`: whether `carbon_scale`, unless `reward` gives it, is 1.8 (`boreal-balanced-v0`) instead of 2
     - `boundary`: "sampled" with the site, or "balanced" (`boreal-balanced-v0`): the temperature far below is the one
       at which no heat flows there under the site's own first stand, found by the spin-up, whatever the site's own.
       The observation shows it, and it may leave the sampled range of 268-272 K

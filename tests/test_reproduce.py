@@ -67,7 +67,7 @@ def test_a_job_knows_its_run():
 
 def test_a_variant_knows_its_run():
     job = next(job for job in experiments.jobs(["variants"]) if "reward_scales" in job.flags)
-    assert job.command == ("python cleanrl_style/ppo_gated.py --seed 1 --vectorization lockstep --reward-scales 2.15 1")
+    assert job.command == ("python cleanrl_style/ppo_gated.py --seed 1 --vectorization lockstep --reward-scales 1.11 1")
     args = Args(vectorization="lockstep", reward_scales=experiments.REWARD_SCALES)
     protocol.make_task(args)
     config = {"script": "ppo_gated", "arguments": vars(args), "not_default": protocol.not_default(args)}

@@ -1,14 +1,16 @@
 """Measures the carbon scale of `boreal-balanced-v0`, at which both returns vary equally in its world.
 
 Reference policies, the 25 constant actions (no change where an action is not valid) and the four fixed strategies,
-play the same sites and weathers. The spread of a return is its standard deviation between the policies of one site,
-pooled over sites. Carbon counts as the net change over the carbon scale, before penalties and clipping, so that its
-spread is in proportion to 1 / carbon_scale; thaw as rewarded.
+play the same sites and weathers. The spread of a return is its standard deviation between those policies of a site that
+a preference chooses between: those that no other beats in both returns. It is pooled over sites. Carbon counts as the
+net change over the carbon scale, before penalties and clipping, so that its spread is in proportion to 1 /
+carbon_scale; thaw as rewarded.
 """
 
 import sys
 from dataclasses import dataclass
 
+import moocore
 import numpy as np
 
 import boreal_env
@@ -21,7 +23,7 @@ FIRST_SEED = 2_000_000_000  # met neither in training nor in evaluation
 
 @dataclass
 class Args:
-    """Prints the carbon scale that equalises the within-site standard deviation of both returns."""
+    """Prints the carbon scale at which both returns vary equally between the policies that none beats in both."""
 
     sites: int = 40
     """sites, each with one start and weather, the same for every policy"""
@@ -58,9 +60,14 @@ def play(args: Args, **reward) -> np.ndarray:
     return np.array(sums)
 
 
-def within_site_spread(sums: np.ndarray) -> np.ndarray:
-    """Standard deviation between a site's policies, pooled over sites; (policies, sites, n) to (n,)."""
-    return np.sqrt(sums.var(axis=0).mean(axis=0))
+def unbeaten(sums: np.ndarray) -> np.ndarray:
+    """Which policies no other beats in both returns on a site, each once; bool (policies, sites)."""
+    return np.column_stack([moocore.is_nondominated(site[:, 1:], maximise=True) for site in sums.swapaxes(0, 1)])
+
+
+def within_site_spread(sums: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Standard deviation between the chosen policies of a site, pooled over sites; (policies, sites, n) to (n,)."""
+    return np.sqrt(sums.var(axis=0, where=chosen[:, :, None]).mean(axis=0))
 
 
 def main(args: Args) -> None:
@@ -72,15 +79,19 @@ def main(args: Args) -> None:
     print("mean over the sites   change/scale   carbon     thaw")
     for name, (change, carbon, thaw) in zip(reference_policies(), sums.mean(axis=1), strict=True):
         print(f"{name:20s} {change / paper:+13.3f} {carbon:+8.2f} {thaw:+8.2f}")
-    change, carbon, thaw = within_site_spread(sums)
+    chosen = unbeaten(sums)
+    change, carbon, thaw = within_site_spread(sums, chosen)
     scale = float(f"{change / thaw:.2g}")
-    print(f"\nwithin-site standard deviations: {len(sums)} policies, {args.sites} sites, {args.years} years")
+    print(
+        f"\nwithin-site standard deviations: of {len(sums)} policies the {chosen.sum(axis=0).mean():.1f} in the mean "
+        f"that none beats in both, {args.sites} sites, {args.years} years"
+    )
     print(
         f"at carbon_scale {paper:g}: change/scale {change / paper:.4f}, thaw {thaw:.4f}, ratio "
         f"{change / paper / thaw:.4f}; carbon return with penalties {carbon:.3f}"
     )
     print(f"balanced carbon_scale: {change / thaw:.4f}, to two digits {scale:g} kgC m-2 yr-1")
-    carbon = within_site_spread(play(args, carbon_scale=scale))[1]
+    carbon = within_site_spread(play(args, carbon_scale=scale), chosen)[1]
     print(f"at carbon_scale {scale:g}: carbon return with penalties and clipping {carbon:.3f}")
 
 
