@@ -1,9 +1,8 @@
 """BoreaRL: managing a boreal stand for carbon and for permafrost, as a mo-gymnasium environment.
 
-`import boreal_env` registers `boreal-generalist-v0`, `boreal-site-specific-v0`, `boreal-balanced-v0` and
-`boreal-warming-v0`. Here are the environment of one stand, with its manual, and that of many in lockstep. What they are
-made of is in `sim/task/`: what is observed, which actions are valid, what is rewarded, the preference, and the episodes
-that both share.
+`import boreal_env` registers the ids of `REGISTERED`, at the end. Here are the environment of one stand, with its
+manual, and that of many in lockstep. What they are made of is in `sim/task/`: what is observed, which actions are
+valid, what is rewarded, the preference, and the episodes that both share.
 """
 
 import gymnasium as gym

@@ -180,7 +180,12 @@ def section(results: Results, name: str) -> str:
 
 
 TABLES = {"distances": distances, "single_sites": sites_alone}
-EXCERPTS = {"speed": excerpts.speed, "shares": excerpts.shares, "towers": excerpts.towers}
+EXCERPTS = {
+    "speed": excerpts.speed,
+    "shares": excerpts.shares,
+    "towers": excerpts.towers,
+    "first_run": excerpts.first_run,
+}
 
 
 def main(args: Args) -> None:

@@ -1,4 +1,5 @@
-"""What README.md and docs/performance.md show of results/benchmark.csv and of docs/validation.md, as Markdown."""
+"""What README.md and docs/performance.md show of results/first_run.txt, results/benchmark.csv and docs/validation.md,
+as Markdown."""
 
 import re
 from pathlib import Path
@@ -63,6 +64,12 @@ def shares() -> str:
     times = figures([f"lockstep, 32 stands: {part}" for part in SHARES])["median"]
     rows = zip(SHARES.values(), 100 * times / times.sum(), strict=True)
     return markdown(["what", "share of a lockstep training"], [[what, f"{share:.0f} %"] for what, share in rows])
+
+
+def first_run() -> str:
+    """The end of what the first run printed."""
+    text = (paths.results() / "first_run.txt").read_text(encoding="utf-8")
+    return f"```text\n{text[text.index('SCORE') :].rstrip()}\n```\n"
 
 
 def cells(line: str) -> list[str]:
