@@ -176,7 +176,7 @@ def thaw_formulations(seeds) -> list[Job]:
 
 
 def balanced(seeds) -> list[Job]:
-    """The three methods where both returns vary equally between policies."""
+    """The methods where both returns vary equally between the policies worth choosing."""
     env = {"env_id": BALANCED}
     return [Job("balanced", script, env) for script in STRATEGIES] + [
         trained("balanced", script, seed, **env) for seed in seeds_of(5, seeds) for script in LEARNERS

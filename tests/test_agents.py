@@ -2,6 +2,7 @@
 
 import pandas as pd
 import pytest
+import torch
 from scripts import ROOT, run_script
 
 from cleanrl_style import protocol
@@ -34,6 +35,15 @@ def test_the_agent_of_a_script_elsewhere(tmp_path):
     with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_own.py; .*script=path"):
         protocol.load_agent(tmp_path / "run")
     evaluate_again(tmp_path / "run", protocol.load_agent(tmp_path / "run", script=path))
+
+
+def test_an_agent_of_another_network_is_refused(tmp_path):
+    train("cleanrl_style/eupg_var_lambda.py", tmp_path)
+    saved = torch.load(tmp_path / "policy.pt", weights_only=True)
+    saved["agent"] = {f"older.{name}": value for name, value in saved["agent"].items()}
+    torch.save(saved, tmp_path / "policy.pt")
+    with pytest.raises(ValueError, match="policy.pt: another version of eupg_var_lambda.py trained it"):
+        protocol.load_agent(tmp_path)
 
 
 def test_a_folder_without_a_policy_is_named(tmp_path):

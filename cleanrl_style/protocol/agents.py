@@ -16,7 +16,8 @@ def load_agent(run_folder, script=None):
     run_folder : with config.json and policy.pt. script : path of the script that trained it, if that does not lie in
     cleanrl_style/.
     Returns a function of observations (n, d) float32, masks (n, 25) bool and accrued returns (n, m), all numpy, that
-    gives action probabilities (n, 25). Raises FileNotFoundError if one of the files, or the script, is missing.
+    gives action probabilities (n, 25). Raises FileNotFoundError if one of the files, or the script, is missing, and
+    ValueError if the script's network is another one by now.
     """
     import torch
 
@@ -29,7 +30,12 @@ def load_agent(run_folder, script=None):
     module = _script_module(name, script)
     space = Box(-np.inf, np.inf, tuple(saved["observation_shape"]), np.float32)
     agent = module.Agent(SimpleNamespace(single_observation_space=space), **saved["arguments"])
-    agent.load_state_dict(saved["agent"])
+    try:
+        agent.load_state_dict(saved["agent"])
+    except RuntimeError as error:
+        raise ValueError(
+            f"{folder / 'policy.pt'}: another version of {name}.py trained it, of another network"
+        ) from error
     return module.make_policy(agent)
 
 
