@@ -28,12 +28,12 @@ STANDS = 65_536  # in one launch: 3 GB of the GPU's memory
 def lane_dtype(dtype: np.dtype) -> np.dtype:
     """One lane of a block's dtype as seen from the lane's first number: everything in its place, one lane long."""
     names = dtype.names or ()
-    fields = [dtype.fields[name] for name in names]
-    return np.dtype(
+    fields = [dtype.fields[name] for name in names]  # type: ignore[index]  # None has no names
+    return np.dtype(  # type: ignore[call-overload]  # offsets are left out of numpy's types
         {
             "names": names,
-            "formats": [one_lane(field) for field, _ in fields],
-            "offsets": [offset for _, offset in fields],
+            "formats": [one_lane(field) for field, _ in fields],  # type: ignore[misc]  # no field has a title
+            "offsets": [offset for _, offset in fields],  # type: ignore[misc]
             "itemsize": dtype.itemsize,
         }
     )

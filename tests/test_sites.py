@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+import boreal_env
 import sim
 from analysis import choose_sites
 from cleanrl_style import protocol
@@ -59,7 +60,7 @@ def test_an_evaluation_takes_the_first_sites():
     assert protocol.evaluation_seeds(task, 3) == TABLE.seed[:3].tolist()
     for message, arguments in {
         "201 episodes: the test split has 200 sites": (201,),
-        "split 'train': allowed are test, validation": (3, "train"),
+        "split 'train': allowed are test, validation, warmer_boundary, further_north, calmer, less_snow": (3, "train"),
     }.items():
         with pytest.raises(ValueError, match=message):
             protocol.evaluation_seeds(task, *arguments)
@@ -71,6 +72,25 @@ def test_an_evaluation_takes_the_first_sites():
 def test_what_draws_no_sites_has_new_weathers(arguments):
     task = protocol.Task.of(**{"env_id": "boreal-generalist-v0", **arguments})
     assert protocol.evaluation_seeds(task, 2) == [sites.FIRST_EVALUATION_SEED, sites.FIRST_EVALUATION_SEED + 1]
+
+
+def test_a_split_outside_moves_one_property_of_the_test_sites():
+    task = protocol.Task.of("boreal-generalist-v0", years=1, time_step_minutes=120)
+
+    def sites_of(split):
+        seen = []
+
+        def plant(observations, masks, accrued_returns):
+            seen.append(observations[0])
+            return np.eye(25)[[12] * len(observations)]
+
+        table, _ = protocol.evaluate(task, plant, [0.5], 1, ("greedy",), split)
+        return table.site_seed[0], dict(zip(boreal_env.OBSERVATION_NAMES, seen[0], strict=True))
+
+    (seed, inside), (same, calm) = sites_of("test"), sites_of("calmer")
+    assert seed == same and calm["site_wind_speed_m_s"] < 0.0 <= inside["site_wind_speed_m_s"]
+    moved = {name for name in inside if name.startswith("site_") and inside[name] != calm[name]}
+    assert moved == {"site_wind_speed_m_s"}
 
 
 def test_support_points_fill_a_line_evenly():

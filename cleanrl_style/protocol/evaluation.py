@@ -11,7 +11,7 @@ import boreal_env
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.fronts import return_columns, weight_columns
 from cleanrl_style.protocol.progress import Progress
-from cleanrl_style.protocol.sites import evaluation_seeds
+from cleanrl_style.protocol.sites import of_split
 from cleanrl_style.protocol.task import Task, as_option, final_info
 from sim.block import lanes_for
 from sim.stands import available_cores
@@ -146,13 +146,13 @@ def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, spli
 
     policy : a function of observations (n, d) float32, masks (n, 25) bool and accrued returns (n, m), giving action
     probabilities (n, 25). weights : each a number (of two objectives, the first's weight) or m numbers. episodes : the
-    first of a split's sites (`sites.evaluation_seeds`).
+    first of a split's sites, inside or outside the range of training (`sites.of_split`).
     Returns the table of episodes (`evaluation_columns`; with a thaw formulation other than asymmetric also ASYMMETRIC)
     and the statistics of the annual record over the episodes of each weight (None if there is no such record).
     """
     weights = [task.check_weights(value) for value in weights]
     numbers = episodes_by_policy(task, episodes, policies)
-    seeds = evaluation_seeds(task, episodes, split)
+    task, seeds = of_split(task, episodes, split)
     if task.boreal:
         compile_physics(lanes_of_evaluation(task, len(weights), episodes, policies))
     other_formulation = (ASYMMETRIC,) if "thaw" in task.objectives and task.thaw_formulation != "asymmetric" else ()

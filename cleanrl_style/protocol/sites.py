@@ -19,6 +19,17 @@ def published_seeds(split: str) -> tuple[int, ...]:
     return tuple(int(row["seed"]) for row in rows if row["split"] == split)
 
 
+def of_split(task: Task, episodes: int, split: str) -> tuple[Task, list[int]]:
+    """The task of a split's episodes, and what its environments are reset with.
+
+    A split is one of `SPLITS`, or one of the task's `shifts`: the test sites, one property of which is moved out of the
+    range that sites are drawn from. Raises ValueError as `evaluation_seeds`.
+    """
+    if split in task.shifts:
+        return task.shifted(split), evaluation_seeds(task, episodes)
+    return task, evaluation_seeds(task, episodes, split)
+
+
 def evaluation_seeds(task: Task, episodes: int, split: str = "test") -> list[int]:
     """What the environments of an evaluation are reset with, a seed an episode.
 
@@ -26,7 +37,7 @@ def evaluation_seeds(task: Task, episodes: int, split: str = "test") -> list[int
     unknown split, and for more episodes than a split has sites.
     """
     if split not in SPLITS:
-        raise ValueError(f"split {split!r}: allowed are {', '.join(SPLITS)}")
+        raise ValueError(f"split {split!r}: allowed are {', '.join((*SPLITS, *task.shifts))}")
     if not task.draws_sites:
         return [FIRST_EVALUATION_SEED + episode for episode in range(episodes)]
     seeds = published_seeds(split)

@@ -11,6 +11,7 @@ from gymnasium.wrappers import OrderEnforcing
 import boreal_env
 from cleanrl_style.protocol.fronts import return_columns, scalarize, weight_columns
 from sim.task.preference import check_weights
+from sim.task.shifts import SHIFTS, shifts_of
 
 # What a boreal environment reports of an episode at its end.
 EPISODE_INFO = ("final_density", "mean_density", "final_conifer_fraction", "mean_conifer_fraction")
@@ -30,6 +31,7 @@ class Task:
     bare: bool = False  # ours itself, in no wrapper that does more than watch the order of calls
     has_lockstep: bool = False
     draws_sites: bool = False  # a new site of ours in every episode
+    shifts: tuple[str, ...] = ()  # ways out of the range that its sites are drawn from (`sim.task.shifts`)
     masks: Callable | None = None  # valid actions as a function of observations; None: the environment is called
     site_entries: tuple[int, ...] = ()  # entries of the observation that are site parameters
     observes_preference: bool = True  # at the front of the observation, all weights but the last
@@ -55,13 +57,15 @@ class Task:
         )
         if isinstance(one, boreal_env.BorealEnv):
             front = names[: len(objectives) - 1]
+            draws_sites = one.mode == "generalist" and one.site_seed is None
             task = replace(
                 task,
                 boreal=True,
                 mode=one.mode.replace("_", "-"),
                 thaw_formulation=one.thaw_formulation,
                 years=one.years,
-                draws_sites=one.mode == "generalist" and one.site_seed is None,
+                draws_sites=draws_sites,
+                shifts=shifts_of(env.spec.kwargs.get("boundary", "sampled")) if draws_sites else (),
                 masks=one.mask_function(),
                 observes_preference=all(name.startswith("preference") for name in front),
             )
@@ -108,6 +112,11 @@ class Task:
     def with_preference(self, value) -> "Task":
         """The same, with one preference in every training episode."""
         return replace(self, preference=self.check_weights(value))
+
+    def shifted(self, shift: str) -> "Task":
+        """The same on sites of which one property is outside the sampled range; one of `shifts`."""
+        overrides = {**(self.env_kwargs.get("parameter_overrides") or {}), **SHIFTS[shift]}
+        return replace(self, env_kwargs={**self.env_kwargs, "parameter_overrides": overrides})
 
     def action_masks(self, envs: gym.vector.VectorEnv, observations: np.ndarray) -> np.ndarray:
         """Valid actions, bool (n, 25): by the observations if they say it, else by calling every environment."""
