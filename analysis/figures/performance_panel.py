@@ -36,7 +36,8 @@ def draw(figure, results) -> None:
         thaw, carbon = (np.mean(one, axis=0) for one in courses)
         known = np.flatnonzero(~np.isnan(thaw))
         training.plot(thaw[known], carbon[known], color=method.colour, linewidth=0.7, alpha=0.6)
-        training.plot(thaw[known[-1]], carbon[known[-1]], method.marker, color=method.colour, label=method.title)
+        last = known[-1:]  # none where no episode came to its end
+        training.plot(thaw[last], carbon[last], method.marker, color=method.colour, label=method.title)
     finish(training, **RETURNS)
     for method in learners(evaluation, results):
         front = mean_front(results.of("main", method.script))
