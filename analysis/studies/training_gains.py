@@ -37,8 +37,10 @@ class Args:
 
 
 def streams(found: results.Results) -> dict[tuple[int, int], int]:
-    """(number of environments, training seed) of the main experiment's runs -> steps."""
+    """(number of environments, training seed) of the main experiment's runs -> steps; groups, whose stands share their
+    episodes, are left out."""
     runs = [one.runs[0] for script in LEARNERS for one in found.of("main", script)]
+    runs = [run for run in runs if run.arguments.get("group_size", 1) == 1]
     return {tuple(run.arguments[name] for name in STREAM): run.arguments["total_timesteps"] for run in runs}
 
 
