@@ -161,9 +161,10 @@ def check(evaluation: pd.DataFrame, config: dict) -> None:
         raise ValueError(f"damaged: evaluation.csv with the returns of {objectives} lacks the column {missing[0]}")
     arguments, primary = config["arguments"], primary_of(config)
     evaluation = evaluation[evaluation.policy == primary]
-    alike = primary == "greedy" and arguments["mode"] == "site-specific"  # every episode is the first again
-    expected = len(arguments["eval_weights"]) * (1 if alike else arguments["eval_episodes"])
-    if len(evaluation) != expected:
+    expected = len(arguments["eval_weights"]) * arguments["eval_episodes"]
+    # on the fixed site every greedy episode is the first again, and one may stand for all
+    alike = primary == "greedy" and arguments["mode"] == "site-specific"
+    if len(evaluation) != expected and not (alike and len(evaluation) == len(arguments["eval_weights"])):
         raise ValueError(
             f"damaged: evaluation.csv has {len(evaluation)} episodes of the {primary} policy, not {expected}"
         )
