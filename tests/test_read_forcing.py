@@ -277,7 +277,7 @@ BAD = {
         r"SW_IN_F in W m-2: a clear day has 0\.0\d+ %",
     ),
     "light by photons": (
-        lambda: tower(lambda t: t.assign(SW_IN_F=t.SW_IN_F * 2)),
+        lambda: tower(lambda t: t.assign(SW_IN_F=t.SW_IN_F * 1.6)),
         r"SW_IN_F.*: a clear day has 1\d\d %",
     ),
     "net longwave": (lambda: tower(LW_IN_F=-60.0), r"row 0 .*LW_IN_F is -60 W m-2; \[50, 600\]"),
@@ -303,7 +303,7 @@ BAD = {
         r"no row for 2019-03-04 12:00 \(solar time\) after the table, row 2999 \(1 of 9600",
     ),
     "an hour twice, at the end of summer time": (
-        with_times(lambda t: t - 100, range(5000, 9600)),
+        with_times(lambda t: t - np.where(t % 10000 < 100, 7700, 100), range(5000, 5010)),
         r"row 5000: 2019-04-15 02:30 is there twice, first in the table, row 4998",
     ),
     "rows out of order": (
@@ -346,7 +346,7 @@ BAD = {
     ),
     "sums that fall": (
         era5(lambda t: t.assign(ssrd=t.ssrd.where(t.index != 3000, 0.0))),
-        r"(row 300\d.*ssrd is -|a clear day has|middle of its light)",
+        r"row 3000 \(2019-05-05 23:00\): ssrd is -[\d.]+ W m-2; \[-10, 1500\] W m-2 is allowed",
     ),
     "an array": (lambda: np.zeros((3, 3)), r"a file, a DataFrame or a Dataset is allowed, got ndarray"),
     "no file": (lambda: "nowhere.csv", r"there is no file nowhere.csv"),
