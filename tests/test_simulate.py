@@ -545,7 +545,9 @@ def test_latitude_and_climate_are_the_forcings_where_they_are_not_given():
     pd.testing.assert_frame_equal(told, simulate(forcing.attrs["site"], forcing=plain))
     assert not told.equals(simulate(forcing=plain))
     assert not told.equals(simulate({"mean_annual_temperature_c": -9.0}, forcing=forcing))
-    with pytest.raises(ValueError, match=r"latitude_deg = 60: the forcing is of 66, and the sun has to be that of its place"):
+    with pytest.raises(
+        ValueError, match=r"latitude_deg = 60: the forcing is of 66, and the sun has to be that of its place"
+    ):
         simulate({"latitude_deg": 60.0}, forcing=forcing)
 
 

@@ -189,7 +189,7 @@ def _pick(quantity, names, table, columns, empty) -> tuple[str | None, list[str]
         if empty(name):
             raise ValueError(f"forcing: column {name}, for {quantity}, has no number")
         return name, []
-    notes = []
+    notes: list[str] = []
     for name in names:
         there = [name] if name in table else _at_positions(name, table)
         for column in there:
