@@ -124,18 +124,17 @@ def read_forcing(
     _fill(table, record, flags, row_of, choice, interval, gaps, longest_gap_days)
     _add_longwave(record, flags, choice, latitude_deg)
     site = _site(record, latitude_deg)
-    flags = flags.astype("int8")
+    flags = flags.fillna(GIVEN).astype("int8")
     if interval == DAY:
         forcing, flags = _in_half_hours(record, flags, choice, latitude_deg, diurnal_cycle)
         report.append(
             "half-hours are made of days (`sim.half_hours`): temperature by a cosine, light by the sun's height"
         )
     else:
-        leap_day = (record.index.month == 2) & (record.index.day == 29)
-        forcing = record[list(OURS)].rename(columns=OURS)[~leap_day]
-        flags = flags[list(OURS)][~leap_day]
+        kept = ~_leap_day(record.index)
+        forcing, flags = record[list(OURS)].rename(columns=OURS)[kept], flags[list(OURS)][kept]
     forcing = forcing.rename_axis("time").join(flags.rename(columns={q: f"{name}_flag" for q, name in OURS.items()}))
-    dropped = int(((wanted.month == 2) & (wanted.day == 29)).sum() * interval // DAY)
+    dropped = int(_leap_day(wanted).sum() * interval // DAY)
     report += [f"29 February was dropped {dropped} times"] if dropped else []
     pressure = choice.columns.get("air_pressure")
     if pressure:
@@ -352,17 +351,18 @@ def _repeat_at_edges(record, flags, row_of, interval: int, report: list[str]) ->
 def _fill(table, record, flags, row_of, choice: Choice, interval: int, gaps: str, longest_gap_days: float) -> None:
     """Refuse gaps or fill them, in place; longwave is left to `_add_longwave`."""
     per_day = DAY // interval
+    kept = ~_leap_day(record.index)  # a record may lack the day that is dropped anyway
     for quantity in OURS:
-        empty = record[quantity].isna().to_numpy()
+        empty = record[quantity].isna().to_numpy() & kept
         if not empty.any() or (quantity == "longwave" and "longwave" not in choice.columns):
             continue
         if gaps == "refuse":
-            raise ValueError(_first_gap(table, record, row_of, choice, quantity, empty))
+            raise ValueError(_first_gap(table, record, row_of, choice, quantity, empty, interval))
         if f"{quantity}_beside" in record:
             _put(record, flags, quantity, record[f"{quantity}_beside"], BY_SOURCE)
         if quantity == "longwave":
             continue
-        left = record[quantity].isna().to_numpy()
+        left = record[quantity].isna().to_numpy() & kept
         first, length = filling.longest(left)
         if length > longest_gap_days * per_day:
             raise ValueError(
@@ -372,12 +372,20 @@ def _fill(table, record, flags, row_of, choice: Choice, interval: int, gaps: str
         if quantity != "precipitation":
             _put(record, flags, quantity, filling.interpolated(record[quantity], interval), BY_LINE)
         _put(record, flags, quantity, filling.mean_course(record[quantity], per_day), BY_MEAN)
-        left = record[quantity].isna()
+        left = record[quantity].isna() & kept
         if left.any():
             raise ValueError(
                 f"{table.name}: {_name(choice, quantity)} is missing at {left.idxmax():%Y-%m-%d %H:%M}, and too little "
                 "is known of that time of day in the weeks around; choose other years"
             )
+
+
+def _moment(time, interval: int) -> str:
+    return f"{time:%Y-%m-%d}" if interval == DAY else f"{time:%Y-%m-%d %H:%M} solar time"
+
+
+def _leap_day(times: pd.DatetimeIndex) -> np.ndarray:
+    return np.asarray((times.month == 2) & (times.day == 29))
 
 
 def _put(record, flags, quantity: str, values, flag: int) -> None:
@@ -386,7 +394,7 @@ def _put(record, flags, quantity: str, values, flag: int) -> None:
     flags.loc[here, quantity] = flag
 
 
-def _first_gap(table, record, row_of, choice, quantity, empty) -> str:
+def _first_gap(table, record, row_of, choice, quantity, empty, interval: int) -> str:
     k = int(np.argmax(empty))
     time, count = record.index[k], int(empty.sum())
     asks = f"({count} of {len(empty)} in all); gaps='fill' fills gaps and flags them"
@@ -394,8 +402,8 @@ def _first_gap(table, record, row_of, choice, quantity, empty) -> str:
     if np.isnan(row):
         known = row_of.iloc[:k].dropna()
         after = f" after {table.where(int(known.iloc[-1]))}" if len(known) else ""
-        return f"{table.name}: no row for {time:%Y-%m-%d %H:%M} (solar time){after} {asks}"
-    return f"{table.where(int(row))} ({time:%Y-%m-%d %H:%M} solar time): {_name(choice, quantity)} is missing {asks}"
+        return f"{table.name}: no row for {_moment(time, interval)}{after} {asks}"
+    return f"{table.where(int(row))} ({_moment(time, interval)}): {_name(choice, quantity)} is missing {asks}"
 
 
 def _name(choice: Choice, quantity: str) -> str:
