@@ -413,15 +413,16 @@ def _name(choice: Choice, quantity: str) -> str:
 
 def _add_longwave(record, flags, choice: Choice, latitude_deg: float) -> None:
     """Compute the longwave that is missing, in place."""
-    if not record["longwave"].isna().any():
+    lacking = record[record["longwave"].isna() & record["air_temperature"].notna() & record["humidity"].notna()]
+    if lacking.empty:
         return
     dates = record.index.normalize()
     mean = record["shortwave"].groupby(dates).mean()
     cloud = pd.Series(cloud_cover(pd.DatetimeIndex(mean.index), mean.to_numpy(), latitude_deg), index=mean.index)
-    air = record["air_temperature"].to_numpy()
-    vapour = record["humidity"].to_numpy() * saturation(air)
-    values = longwave(air, vapour, cloud.reindex(dates).to_numpy())
-    _put(record, flags, "longwave", pd.Series(values, index=record.index), COMPUTED)
+    air = lacking["air_temperature"].to_numpy()
+    vapour = lacking["humidity"].to_numpy() * saturation(air)
+    values = longwave(air, vapour, cloud.reindex(lacking.index.normalize()).to_numpy())
+    _put(record, flags, "longwave", pd.Series(values, index=lacking.index).reindex(record.index), COMPUTED)
 
 
 def _in_half_hours(record, flags, choice: Choice, latitude_deg: float, cycle: DiurnalCycle):
