@@ -179,7 +179,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     ## Arguments
     - `mode`: "generalist" or "site_specific"
     - `years`: length of an episode (50)
-    - `time_step_minutes`: any divisor of 1440 (30)
+    - `time_step_minutes`: a divisor of 1440, at most 120 (30)
     - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (on a GPU, for thousands of stands)
     - `thaw_formulation`: "asymmetric", "contrast" or "raw_degree_days"
     - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one; of m objectives, not two, all m weights

@@ -1,11 +1,14 @@
 """The simulator of a boreal stand: energy, water, carbon, demography, disturbance and management.
 
-`simulate` runs one stand and returns a table; `Stands` steps many, for the environment. `sample_site` draws the
-parameters of a site. `docs/model.md` has the equations.
+`simulate` runs one stand and returns a table; `read_forcing` makes its weather of a tower's file. `Stands` steps many,
+for the environment. `sample_site` draws the parameters of a site. `docs/simulator.md` shows how to use it,
+`docs/model.md` has the equations.
 """
 
 from sim.closure import PhysicsError
 from sim.draws import Seeds, episode_seeds
+from sim.io.disaggregation import DiurnalCycle, diurnal_cycle, half_hours
+from sim.io.forcing import read_forcing
 from sim.jit import cache_folder
 from sim.parameters import (
     CONSTANTS,
@@ -30,12 +33,16 @@ __all__ = [
     "RECORD_NAMES",
     "SCENARIOS",
     "SITE_PARAMETERS",
+    "DiurnalCycle",
     "PhysicsError",
     "Seeds",
     "Stands",
     "cache_folder",
+    "diurnal_cycle",
     "episode_seeds",
+    "half_hours",
     "middle_site",
+    "read_forcing",
     "sample_site",
     "scale_site",
     "simulate",

@@ -28,6 +28,7 @@ NUM_ACTIONS = len(DENSITY_CHANGES) * len(CONIFER_MIXES)
 _CHANGES, _MIXES = np.array(DENSITY_CHANGES), np.array(CONIFER_MIXES)
 LEAST_DENSITY = 150.0  # stems ha-1 that thinning leaves
 LARGEST_DENSITY = 2000.0  # stems ha-1 that planting reaches
+NOTHING = 12  # an action that neither plants nor cuts
 NEGLIGIBLE_STEMS = 0.01  # stems ha-1; a smaller shortfall counts as done
 
 
@@ -42,11 +43,12 @@ def decode(actions) -> tuple[np.ndarray, np.ndarray]:
     return _CHANGES[density], _MIXES[mix]
 
 
-def check_actions(actions, number) -> np.ndarray:
-    """Actions as integers, shape (number,). Raises ValueError naming the first that is not in [0, 25)."""
+def check_actions(actions, number, of="stands") -> np.ndarray:
+    """Actions as integers, shape (number,), one for each of so many stands or years. Raises ValueError naming the first
+    that is not in [0, 25)."""
     values = np.asarray(actions)
     if values.shape != (number,):
-        raise ValueError(f"actions of shape {values.shape}: one integer for each of {number} stands is allowed")
+        raise ValueError(f"actions of shape {values.shape}: one integer for each of {number} {of} is allowed")
     if not np.issubdtype(values.dtype, np.integer):
         raise ValueError(f"actions of type {values.dtype}: integers in [0, {NUM_ACTIONS}) are allowed")
     wrong = values[(values < 0) | (values >= NUM_ACTIONS)]

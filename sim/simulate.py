@@ -1,36 +1,58 @@
-"""The scientist's door: one stand, given actions, generated or observed weather, a table out."""
+"""The scientist's door: one stand, given actions, generated or observed weather, a table or a Dataset out."""
+
+import sys
 
 import numpy as np
 import pandas as pd
 
+from sim.block import is_compiled
 from sim.draws import episode_seeds
-from sim.management import check_actions
-from sim.parameters import middle_site
-from sim.spin_up import check_initial
-from sim.stands import Stands
-from sim.state import DAILY_NAMES, DAYS, FORCING, RECORD_NAMES
+from sim.io.check import check_forcing, interval_of
+from sim.io.dataset import import_xarray, to_dataset
+from sim.jit import uncompiled
+from sim.management import NOTHING, check_actions, decode
+from sim.parameters import SITE_PARAMETERS, check_mapping, middle_site
+from sim.physical_constants import FREEZING_POINT_K
+from sim.scenario import FIRST_YEAR
+from sim.spin_up import BOUNDARY, INITIAL_RANGES, check_initial, crown_covers, first_state, first_stems
+from sim.stands import HELD_COLUMNS, Stands
+from sim.state import DAILY, DAILY_NAMES, DAYS, PARAMETER_NAMES, RECORD, RECORD_NAMES
+from sim.structure import leaf_out
 
-#: Allowed values of an observed forcing: column -> (low, high, unit, hint).
-FORCING_LIMITS = {
-    "air_temperature_c": (-75.0, 50.0, "degC", "is it in kelvin?"),
-    "relative_humidity": (0.0, 1.1, "share of 1", "is it in percent?"),
-    "wind_speed_m_s": (0.0, 60.0, "m s-1", ""),
-    "shortwave_w_m2": (0.0, 1500.0, "W m-2", "negative night offsets have to be set to 0"),
-    "longwave_w_m2": (50.0, 600.0, "W m-2", ""),
-    "precipitation_mm": (0.0, 200.0, "mm per interval", ""),
+OUTPUTS = ("annual", "daily", "xarray")
+DEFAULT_YEARS, MOST_YEARS = 50, 10_000
+DEFAULT_MINUTES = 30
+NUMBER = (int, float, np.number)
+
+#: Site parameters of a stand whose stems neither come nor go.
+HELD_STAND = {
+    "natural_mortality": 0.0,
+    "density_dependent_mortality": 0.0,
+    "recruitment_rate": 0.0,
+    "fire_base_probability": 0.0,
+    "insect_base_probability": 0.0,
+}
+NET_EXCHANGE = "nee_kgc_m2"
+#: Name -> (unit, meaning) of what the tables have beside the columns of `sim.state`.
+ADDED = {
+    "year": ("year", "from 0"),
+    "doy": ("day of year", "from 1"),
+    NET_EXCHANGE: ("kgC m-2", "net ecosystem exchange: respiration less gross primary production; uptake is negative"),
 }
 
 
 def simulate(
-    site,
-    actions,
+    site=None,
+    actions=None,
     *,
-    seed,
-    years=50,
-    time_step_minutes=30,
+    seed=0,
+    years=None,
+    time_step_minutes=None,
     backend="numba",
     forcing=None,
     initial=None,
+    hold_stand=False,
+    lai=None,
     output="annual",
     constants=None,
     mechanisms=None,
@@ -47,37 +69,56 @@ def simulate(
     ----------
     site : dict of site parameters that differ from the middle of their ranges (any value inside the physical
         limits of `sim/site_parameters.csv`), or None. All of them, as `sim.sample_site` returns them, are a site too.
-    actions : integer in [0, 25) for every year, or a sequence with one a year; 12 changes nothing.
+        Latitude and climate are the forcing's, where `sim.read_forcing` made it and they are not given.
+    actions : integer in [0, 25) for every year, or a sequence with one a year; None changes nothing.
     seed : of first state, weather and disturbances.
-    years : years to run.
-    forcing : observed weather instead of the generator: DataFrame with a regular DatetimeIndex of local solar time
-        (start of the interval, from midnight) and the columns air_temperature_c [degC], relative_humidity [0-1, over
-        water], wind_speed_m_s, shortwave_w_m2, longwave_w_m2 [W m-2], precipitation_mm [mm per interval]. Whole
-        years of 365 days (29 February is dropped), repeated if there are fewer than `years`; or, with years=1,
-        whole days of a part of a year that starts on 1 January. Intervals finer than the time step are averaged.
+    years : years to run, at most 10,000; by default those of the forcing, or 50.
+    forcing : observed weather instead of the generator, as `sim.read_forcing` returns it: DataFrame with a regular
+        DatetimeIndex of local solar time (start of the interval, from midnight) and the columns air_temperature_c
+        [degC], relative_humidity [0-1, over water], wind_speed_m_s, shortwave_w_m2, longwave_w_m2 [W m-2],
+        precipitation_mm [mm per interval]. Whole years of 365 days (29 February is dropped), repeated if there are
+        fewer than `years`; or, with years=1, whole days of a part of a year that starts on 1 January. Intervals finer
+        than the time step are averaged.
     initial : first stocks by name: density_stems_ha, conifer_fraction, biomass_kgc_m2, soil_kgc_m2,
         conifer_deadwood_kgc_m2, deciduous_deadwood_kgc_m2, hwp_kgc_m2, organic_layer_m, oldest_age_years, or stems by
         class (conifer_mature_stems_ha, ...); the rest is drawn, but for the stems' age, which follows from biomass and
         density, and for dead wood, which is what the stand's deaths keep up, where they are not given.
-    output : "annual" for one row a year (columns `sim.state.RECORD`), "daily" for one row a day (`sim.state.DAILY`).
+    hold_stand : True keeps the stand as it begins: no stem dies, comes up, burns or is eaten, and on every 1 January
+        trees, soil carbon, dead wood and organic layer are those of the first. Dead wood is then none, unless given.
+    lai : leaf area of the first stand in full leaf, per ground area [m2 m-2]; None leaves it to crowns and site.
+    output : "annual" for one row a year (columns `sim.state.RECORD`), "daily" for one row a day (`sim.state.DAILY`),
+        "xarray" for a Dataset of both with names and units of ALMA and CF (`sim.io.dataset`; `.to_netcdf(file)`).
+    boundary : temperature far below: "sampled", the site's; "balanced", that at which no heat flows through it below
+        the first stand; or a number [degC].
     scenario : climate change, see `sim.Stands`; not with `forcing`, which is weather of its own.
-    constants, mechanisms, weather, boundary, soil_carbon, hwp_half_life_years, harvest_min_class, time_step_minutes,
-    backend : see `sim.Stands`.
+    time_step_minutes : a divisor of a day of at most 120 minutes; by default 30, or the forcing's interval if longer.
+    constants, mechanisms, weather, soil_carbon, hwp_half_life_years, harvest_min_class, backend : see `sim.Stands`.
 
     Returns
     -------
-    pandas.DataFrame, with a column `year` (from 0) and, daily, `doy` (from 1).
+    pandas.DataFrame, indexed by `time` (start of the year or day: the forcing's, going on where it is repeated, or from
+    2025 on; there is no 29 February), with a column `year` (from 0), daily `doy` (from 1), and `nee_kgc_m2`, net
+    exchange; `attrs["units"]` has each column's unit. Or an xarray.Dataset.
 
     Raises
     ------
     ValueError for bad input, naming the value and what is allowed; `sim.PhysicsError` if a balance does not close.
     """
-    if output not in ("annual", "daily"):
-        raise ValueError(f"output {output!r}: allowed are annual, daily")
-    if isinstance(years, bool) or not isinstance(years, (int, np.integer)) or years < 1:
-        raise ValueError(f"years: a positive integer is allowed, got {years!r}")
-    per_year = np.full(years, actions) if np.ndim(actions) == 0 else np.asarray(actions)
-    check_actions(per_year, years)
+    if not isinstance(output, str) or output not in OUTPUTS:
+        raise ValueError(f"output {output!r}: allowed are {', '.join(OUTPUTS)}")
+    if output == "xarray":
+        import_xarray('output="xarray"')
+    if not isinstance(hold_stand, (bool, np.bool_)):
+        raise ValueError(f"hold_stand: True or False is allowed, got {hold_stand!r}")
+    interval = DEFAULT_MINUTES if forcing is None else interval_of(forcing)
+    if time_step_minutes is None:
+        time_step_minutes = max(DEFAULT_MINUTES, interval)
+    years = _check_years(years, forcing, interval)
+    per_year = np.full(years, NOTHING if actions is None else actions) if np.ndim(actions) == 0 else np.asarray(actions)
+    check_actions(per_year, years, "years")
+    overrides, boundary = _with_boundary(_of_forcing(site, forcing), boundary)
+    if hold_stand:
+        overrides |= HELD_STAND
     stand = Stands(
         1,
         time_step_minutes=time_step_minutes,
@@ -94,76 +135,124 @@ def simulate(
     if stand.scenario is not None:
         if forcing is not None:
             raise ValueError("scenario: only generated weather can change; with forcing, None is allowed")
-        stand.scenario.check_years(int(years))
+        stand.scenario.check_years(years)
     observed, days = None, DAYS
     if forcing is not None:
-        observed, days = check_forcing(forcing, time_step_minutes, int(years))
+        observed, days = check_forcing(forcing, time_step_minutes, years)
     first_weather = None if observed is None else observed[0]
-    stand.start(0, [middle_site(site)], [episode_seeds(seed)], {0: check_initial(initial)}, observed=first_weather)
+    place, seeds, stocks = middle_site(overrides), episode_seeds(seed), check_initial(initial)
+    if lai is not None:
+        place = _with_leaf_area(place, lai, stand, seeds, stocks)
+    if hold_stand and decode(per_year)[0].any():
+        raise ValueError("hold_stand: a stand that is held is neither planted nor cut; actions=None is allowed")
+    if backend == "numba" and not is_compiled(stand.lanes):
+        print("compiling the simulator, once for this processor: about a minute", file=sys.stderr, flush=True)
+    stand.start(0, [place], [seeds], {0: stocks}, observed=first_weather)
 
-    tables = []
+    held = stand.state[:, HELD_COLUMNS].copy()
+    records, rows = [], []
     for year in range(years):
-        weather = None if observed is None else observed[year % len(observed)]
-        record, daily = stand.step(per_year[year : year + 1], observed=weather, days=days, daily=True)
-        if output == "annual":
-            table = pd.DataFrame(record, columns=RECORD_NAMES)
-        else:
-            table = pd.DataFrame(daily[0], columns=DAILY_NAMES)
-            table.insert(0, "doy", np.arange(1, days + 1))
-        table.insert(0, "year", year)
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True)
+        year_weather = None if observed is None else observed[year % len(observed)]
+        record, daily = stand.step(per_year[year : year + 1], observed=year_weather, days=days, daily=True)
+        if hold_stand:
+            stand.state[:, HELD_COLUMNS] = held
+        records.append(record)
+        if output != "annual":
+            rows.append(daily[0])
+    first_year = FIRST_YEAR if forcing is None else int(forcing.index[0].year)
+    annual = _table(np.concatenate(records), RECORD_NAMES, _new_year(first_year, years), 1)
+    if output == "annual":
+        return annual
+    daily = _table(np.concatenate(rows), DAILY_NAMES, _dates(first_year, years, days), days)
+    if output == "daily":
+        return daily
+    boundary_c = stand.parameters[0, PARAMETER_NAMES.index(BOUNDARY)] - FREEZING_POINT_K
+    about = {"seed": seed, "time_step_minutes": time_step_minutes, "hold_stand": int(hold_stand), "site": place}
+    about |= {"initial": stocks, "actions": per_year.tolist()}
+    if forcing is not None:
+        about["forcing"] = "; ".join(forcing.attrs.get("report", ["as given"]))
+    return to_dataset(daily, annual, RECORD | DAILY | ADDED, stand.constants, boundary_c, about)
 
 
-def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> tuple[list[np.ndarray], int]:
-    """Observed weather as one array (days x steps a day, 6) a year, and the days a year.
+def _check_years(years, forcing, interval: int) -> int:
+    if years is None:
+        return DEFAULT_YEARS if forcing is None else max(1, len(forcing) * interval // (1440 * DAYS))
+    if isinstance(years, bool) or not isinstance(years, (int, np.integer)) or years < 1:
+        raise ValueError(f"years: a positive integer is allowed, got {years!r}")
+    if years > MOST_YEARS:
+        raise ValueError(f"years = {years}: at most {MOST_YEARS} are allowed")
+    return int(years)
 
-    Raises ValueError that names the column, the time and what is allowed.
-    """
-    if not isinstance(forcing, pd.DataFrame) or not isinstance(forcing.index, pd.DatetimeIndex):
-        raise ValueError("forcing: a DataFrame with a DatetimeIndex is allowed")
-    missing = [name for name in FORCING if name not in forcing]
-    if missing:
-        raise ValueError(f"forcing: column {missing[0]} is missing; needed: {', '.join(FORCING)}")
-    index = forcing.index
-    if len(index) < 2:
-        raise ValueError(f"forcing: {len(index)} rows; whole days at a regular interval are allowed")
-    interval = index[1] - index[0]
-    minutes = interval / pd.Timedelta(minutes=1)
-    if minutes <= 0:
-        raise ValueError(f"forcing: times do not increase at {index[1]}")
-    late = index[1:][np.diff(index.to_numpy()) != interval.to_timedelta64()]
-    for time in late:
-        leap_day_dropped = (time.month, time.day, time.hour, time.minute) == (3, 1, 0, 0) and time.is_leap_year
-        if not leap_day_dropped or time - interval - pd.Timedelta(days=1) not in index:
-            raise ValueError(f"forcing: times are not regular at {time}; fill the gap or drop the year")
-    if time_step_minutes % minutes:
+
+def _of_forcing(site, forcing) -> dict:
+    """The site's overrides, with what the forcing's record tells of it where they do not."""
+    given = check_mapping("site parameters", site)
+    told = {} if forcing is None else forcing.attrs.get("site", {})
+    name = "latitude_deg"
+    if name in told and isinstance(given.get(name), NUMBER) and abs(given[name] - told[name]) > 1.0:
         raise ValueError(
-            f"time_step_minutes = {time_step_minutes}: the forcing comes every {minutes:g} minutes; "
-            "the same or a multiple is allowed"
+            f"{name} = {given[name]:g}: the forcing is of {told[name]:g}, and the sun has to be that of its place"
         )
-    kept = forcing.loc[~((index.month == 2) & (index.day == 29)), list(FORCING)]
-    for name, (low, high, unit, hint) in FORCING_LIMITS.items():
-        if not pd.api.types.is_numeric_dtype(kept[name]):
-            raise ValueError(f"forcing: {name} has type {kept[name].dtype}; numbers are allowed")
-        values = kept[name].to_numpy(float)
-        wrong = ~((values >= low) & (values <= high))
-        if wrong.any():
-            at = kept.index[wrong][0]
-            value = values[wrong][0]
-            what = "a gap" if np.isnan(value) else f"{value:g}"
-            why = f" ({hint})" if hint and not np.isnan(value) else ""
-            raise ValueError(f"forcing: {name} is {what} at {at}; [{low:g}, {high:g}] {unit} is allowed{why}")
-    if (kept.index[0].month, kept.index[0].day, kept.index[0].hour, kept.index[0].minute) != (1, 1, 0, 0):
-        raise ValueError(f"forcing starts at {kept.index[0]}; it has to start at 00:00 of 1 January")
-    per_day = 1440 / minutes
-    days = len(kept) / per_day
-    if days % 1 or (days > DAYS and days % DAYS) or (days < DAYS and years > 1):
-        raise ValueError(f"forcing of {days:g} days: whole years of 365 days, or whole days with years=1, are allowed")
-    group = int(time_step_minutes // minutes)
-    values = kept.to_numpy(float).reshape(-1, group, len(FORCING))
-    steps = values.mean(axis=1)
-    steps[:, FORCING.index("precipitation_mm")] *= group
-    days = int(min(days, DAYS))
-    by_year = steps.reshape(-1, days * 1440 // time_step_minutes, len(FORCING))
-    return [np.ascontiguousarray(year) for year in by_year], days
+    return {**told, **given}
+
+
+def _with_boundary(site: dict, boundary) -> tuple[dict, object]:
+    """The site with a boundary's temperature that is given as a number [degC], and how the boundary is found."""
+    if isinstance(boundary, (bool, np.bool_)) or not isinstance(boundary, NUMBER):
+        return site, boundary
+    parameter = SITE_PARAMETERS[BOUNDARY]
+    low, high = (limit - FREEZING_POINT_K for limit in (parameter.physical_low, parameter.physical_high))
+    if not low <= boundary <= high:
+        raise ValueError(f"boundary = {boundary:g}: a temperature in [{low:g}, {high:g}] degC, or a name, is allowed")
+    if BOUNDARY in site:
+        raise ValueError(f"boundary = {boundary:g}: the site has {BOUNDARY} too; one of them is allowed")
+    return {**site, BOUNDARY: float(boundary) + FREEZING_POINT_K}, "sampled"
+
+
+def _with_leaf_area(site: dict, lai, stand: Stands, seeds, stocks: dict) -> dict:
+    """The site whose crowns have so many leaves that its first stand has this leaf area in full leaf."""
+    if isinstance(lai, (bool, np.bool_)) or not isinstance(lai, NUMBER) or not 0.0 < lai <= 15.0:
+        raise ValueError(f"lai = {lai!r}: a number in (0, 15] m2 m-2 is allowed")
+    values = {**site, **stand.constants, **stand.mechanisms}
+    state = first_state(values, np.random.default_rng(seeds.start), stocks, INITIAL_RANGES)
+    covers = dict(zip(("max_lai_conifer", "max_lai_deciduous"), crown_covers(first_stems(state), values), strict=True))
+    leaf = uncompiled(leaf_out)
+    dates = ("growth_start_day", "growth_rate", "fall_start_day", "fall_rate")
+    full = max(leaf(day, *(site[name] for name in dates)) for day in range(DAYS))
+    out = {"max_lai_conifer": 1.0, "max_lai_deciduous": full}
+    now = sum(site[name] * covers[name] * out[name] for name in covers)
+    if now <= 0.0:
+        raise ValueError(f"lai = {lai:g}: the first stand has no crowns; give stems by initial=")
+    there = [name for name in covers if covers[name] > 0.0]
+    most = min(SITE_PARAMETERS[name].physical_high / site[name] for name in there)
+    least = max(SITE_PARAMETERS[name].physical_low / site[name] for name in there)
+    if not least <= lai / now <= most:
+        raise ValueError(
+            f"lai = {lai:g}: crowns cover {sum(covers.values()):.2g} of the ground, so [{least * now:.2g}, "
+            f"{most * now:.2g}] m2 m-2 is allowed; more or older stems in initial= cover more"
+        )
+    return site | {name: site[name] * (lai / now) for name in there}
+
+
+def _table(values: np.ndarray, names, dates: pd.DatetimeIndex, days: int) -> pd.DataFrame:
+    """A table of years or days, with dates and units."""
+    table = pd.DataFrame(values, columns=names, index=dates)
+    table[NET_EXCHANGE] = (
+        table["autotrophic_respiration_kgc_m2"] + table["heterotrophic_respiration_kgc_m2"] - table["gpp_kgc_m2"]
+    )
+    if days > 1:
+        table.insert(0, "doy", np.arange(len(table)) % days + 1)
+    table.insert(0, "year", np.arange(len(table)) // days)
+    described = (DAILY if days > 1 else RECORD) | ADDED
+    table.attrs["units"] = {name: described[name][0] for name in table}
+    return table
+
+
+def _new_year(first: int, years: int) -> pd.DatetimeIndex:
+    return pd.DatetimeIndex([f"{year}-01-01" for year in range(first, first + years)], name="time")
+
+
+def _dates(first: int, years: int, days: int) -> pd.DatetimeIndex:
+    """Every day of the years but 29 February, or so many days of the only year."""
+    dates = pd.date_range(f"{first}-01-01", f"{first + years - 1}-12-31", name="time")
+    return dates[~((dates.month == 2) & (dates.day == 29))][: years * days]

@@ -83,6 +83,10 @@ def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float
         low, high = limits[name]
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not low <= value <= high:
             raise ValueError(f"initial {name} = {value!r}: a number in [{low:g}, {high:g}] is allowed")
+    classes = [values[name] for name in CLASS_NAMES if name in values]
+    stems = sum(classes) if classes else values.get("density_stems_ha", 1.0)
+    if stems == 0.0 and values.get("biomass_kgc_m2", 0.0) > 0.0:
+        raise ValueError(f"initial biomass_kgc_m2 = {values['biomass_kgc_m2']:g}: without stems, 0 is allowed")
     return {name: float(value) for name, value in values.items()}
 
 
@@ -156,6 +160,13 @@ def first_state(parameters: dict, generator: np.random.Generator, given: dict | 
 
 def organic_depth_in_balance(stems: np.ndarray, parameters: dict) -> float:
     """Depth [m] of the organic layer in balance with the crowns of these stems by species and age, shape (2, AGES)."""
+    cover = crown_covers(stems, parameters)
+    depths = np.array([parameters["organic_depth_conifer_m"], parameters["organic_depth_deciduous_m"]])
+    return float(cover @ depths + (1.0 - cover.sum()) * parameters["organic_depth_open_m"])
+
+
+def crown_covers(stems: np.ndarray, parameters: dict) -> np.ndarray:
+    """Shares of the ground under conifers' and deciduous trees' crowns, from stems by species and age, (2, AGES)."""
     crowns = np.zeros(2)
     for k, species in enumerate(("conifer", "deciduous")):
         grown_as = species if parameters["crown_development"] else "conifer"
@@ -163,9 +174,12 @@ def organic_depth_in_balance(stems: np.ndarray, parameters: dict) -> float:
         relative = np.array([crown_factor(age, *factors) for age in range(AGES)])
         crowns[k] = stems[k] @ relative * parameters[f"crown_area_{species}_m2"] / SQUARE_METRES_PER_HECTARE
     area = crowns.sum()
-    cover = (1.0 - math.exp(-area)) * crowns / area if area > 0.0 else crowns
-    depths = np.array([parameters["organic_depth_conifer_m"], parameters["organic_depth_deciduous_m"]])
-    return float(cover @ depths + (1.0 - cover.sum()) * parameters["organic_depth_open_m"])
+    return (1.0 - math.exp(-area)) * crowns / area if area > 0.0 else crowns
+
+
+def first_stems(state: np.ndarray) -> np.ndarray:
+    """Stems by species and age of a `first_state`, shape (2, AGES)."""
+    return state[-2 * AGES :].reshape(2, AGES)
 
 
 def drawn_stocks(dice: dict, given: dict, ranges: dict) -> dict[str, float]:

@@ -18,7 +18,7 @@ from sim.closure import check_closure
 from sim.deadwood import deadwood_in_balance
 from sim.demography import AGES, first_ages
 from sim.draws import Seeds, draw_slice, draw_year, restored_generator
-from sim.management import check_actions, first_cut_age
+from sim.management import NOTHING, check_actions, first_cut_age
 from sim.parameters import check_constants, check_mechanisms, check_name, check_weather
 from sim.scenario import CO2, WITHOUT_SCENARIO, check_scenario
 from sim.spin_up import (
@@ -48,6 +48,8 @@ from sim.state import (
     STATE_SIZE,
 )
 
+LONGEST_STEP_MINUTES = 120  # beyond, the air is up to 2 K too warm
+
 
 class Stands:
     """A number of stands, each with its own site, state and random streams.
@@ -55,7 +57,7 @@ class Stands:
     Parameters
     ----------
     number : stands.
-    time_step_minutes : any divisor of a day's 1440 minutes.
+    time_step_minutes : a divisor of a day's 1440 minutes, at most 120: with fewer steps the sun's warmth is misjudged.
     backend : "numba", "python" (the same source, interpreted), or "cuda" (on a GPU, see `sim.cuda`).
     constants : literature constants to override, name -> value (see `sim/constants.csv`).
     mechanisms : switches, name -> bool (see `sim.parameters.MECHANISMS`).
@@ -91,8 +93,11 @@ class Stands:
     ):
         self.number = _positive_integer("number of stands", number)
         minutes = _positive_integer("time_step_minutes", time_step_minutes)
-        if 1440 % minutes:
-            raise ValueError(f"time_step_minutes = {minutes}: a divisor of 1440 is allowed, such as 10, 15, 30, 60")
+        if 1440 % minutes or minutes > LONGEST_STEP_MINUTES:
+            raise ValueError(
+                f"time_step_minutes = {minutes}: a divisor of 1440 is allowed, such as 10, 15, 30, 60, and at most "
+                f"{LONGEST_STEP_MINUTES}"
+            )
         if backend not in BACKENDS:
             raise ValueError(f"backend {backend!r}: allowed are {', '.join(BACKENDS)}")
         self.steps_per_day = 1440 // minutes
@@ -181,7 +186,6 @@ class Stands:
         Returns the last year's record.
         """
         first = self.state[stands].copy()
-        held = [STATE_NAMES.index(name) for name in HELD_IN_SPIN_UP] + list(range(len(STATE), STATE_SIZE))
         deep, surface = STATE_NAMES.index("deep_heat"), RECORD_NAMES.index("surface_soil_temperature_c")
         deep_mean, boundary = RECORD_NAMES.index("deep_soil_temperature_c"), PARAMETER_NAMES.index(BOUNDARY)
         wood = [STATE_NAMES.index(name) for name in DEADWOOD]
@@ -194,7 +198,7 @@ class Stands:
             self.weather["weather_as_observed"], self.constants["temperature_persistence"]
         ).items():
             draws[:, draw_slice(name)] = values
-        nothing = np.full(len(stands), 12)
+        nothing = np.full(len(stands), NOTHING)
         steps = self.steps_per_day if observed is not None else min(self.steps_per_day, SPIN_UP_STEPS_PER_DAY)
         heat_before = gain_before = None
         for year in range(SPIN_UP_YEARS):
@@ -203,7 +207,7 @@ class Stands:
             self._check(stands, self.parameters[stands], state, record, "spin-up")
             balanced = deadwood_in_balance(first[:, wood], record[:, died], record[:, decayed])
             first[:, wood] = np.where(deadwood_found, balanced * living[:, None], first[:, wood])
-            state[:, held] = first[:, held]
+            state[:, HELD_COLUMNS] = first[:, HELD_COLUMNS]
             gain = state[:, deep] - heat
             if year > 0:  # the first year only lays the snow
                 sites = [dict(zip(PARAMETER_NAMES, self.parameters[stand], strict=True)) for stand in stands]
@@ -346,6 +350,9 @@ HELD_IN_SPIN_UP = (
     "organic_depth",
     "drought",
 )
+
+#: Columns of the state that a stand which is held keeps: these stocks, and the stems by age.
+HELD_COLUMNS = [STATE_NAMES.index(name) for name in HELD_IN_SPIN_UP] + list(range(len(STATE), STATE_SIZE))
 
 
 def available_cores() -> int:

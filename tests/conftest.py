@@ -6,7 +6,7 @@ import signal
 
 from hypothesis import settings
 
-from sim import block
+from sim import block, stands
 from sim.jit import cache_folder
 
 # Files that train, run a study or a script's process, or need every kernel; `pytest -m quick` leaves them out.
@@ -23,6 +23,9 @@ def pytest_collection_modifyitems(items):
         if item.path.stem not in slow:
             item.add_marker("quick")
 
+
+# Bookkeeping is tested in steps of hours, for speed; that users may not is in test_simulate.py.
+stands.LONGEST_STEP_MINUTES = 1440
 
 settings.register_profile("repeatable", deadline=None, derandomize=True, database=None, max_examples=60)
 settings.load_profile("repeatable")

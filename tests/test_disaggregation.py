@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.validation import disaggregation
-from analysis.validation.disaggregation import DiurnalCycle, diurnal_cycle, half_hours
+from sim.io import disaggregation
+from sim.io.disaggregation import DiurnalCycle, diurnal_cycle, half_hours
 
 CYCLE = DiurnalCycle(half_range_per_shortwave=0.03, peak_hour=15.0)
 LATITUDE = 65.0

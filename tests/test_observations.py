@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from analysis.validation import climate_records, forest_towers, poker_flat, tower_comparison, towers
+from sim.io import longwave
 from sim.simulate import check_forcing
 
 
@@ -114,5 +115,5 @@ def test_extraterrestrial_radiation_is_the_closed_integral_over_the_day(latitude
         sunset = np.arccos(-np.tan(phi) * np.tan(delta))
         integral = sunset * np.sin(phi) * np.sin(delta) + np.cos(phi) * np.cos(delta) * np.sin(sunset)
         mean = 1361.0 * (1.0 + 0.033 * np.cos(2.0 * np.pi * day / 365.0)) * integral / np.pi
-        found = climate_records.extraterrestrial(pd.DatetimeIndex([date]), latitude)[0]
+        found = longwave.extraterrestrial(pd.DatetimeIndex([date]), latitude)[0]
         assert found == pytest.approx(mean, rel=0.003)

@@ -19,7 +19,7 @@ PATHS = {name: pd.DataFrame(table) for name, table in sim.SCENARIOS.items()}
 
 def simulate(scenario=None, **kwargs):
     arguments = {"years": 3, "boundary": "balanced", "mechanisms": {"fire": False}, "time_step_minutes": 120} | kwargs
-    return sim.simulate(SITE, 12, seed=1, scenario=scenario, **arguments)
+    return sim.simulate(SITE, 12, seed=1, scenario=scenario, **arguments).reset_index(drop=True)
 
 
 def path(years=3, **columns):

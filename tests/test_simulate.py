@@ -1,16 +1,19 @@
 """The scientist's door: the table, observed weather, overrides that change nothing else, refusals, magnitudes."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from scripts import ROOT
 
 import sim
 from sim import spin_up
 from sim.demography import AGES
 from sim.parameters import CONSTANTS, SITE_PARAMETERS, check_constants, check_mechanisms, mean_annual_temperature
-from sim.simulate import check_forcing
+from sim.simulate import HELD_STAND, check_forcing
 from sim.state import DAILY, FORCING
 
 QUICK = {"seed": 1, "years": 1, "time_step_minutes": 240}
@@ -31,7 +34,8 @@ water_residual_mm carbon_residual_kgc_m2 stems_residual_ha
 
 
 def simulate(site=None, actions=12, **changes):
-    return sim.simulate(site, actions, **{**QUICK, **changes})
+    """The table by its row, not by its dates."""
+    return sim.simulate(site, actions, **{**QUICK, **changes}).reset_index(drop=True)
 
 
 def observed(days=365, minutes=240, start="2019-01-01", **columns):
@@ -62,7 +66,7 @@ def test_annual_record_has_the_contracts_columns():
 
 def test_daily_output_has_a_row_a_day():
     table = simulate(years=2, output="daily")
-    assert tuple(table.columns) == ("year", "doy", *DAILY)
+    assert tuple(table.columns) == ("year", "doy", *DAILY, "nee_kgc_m2")
     assert table.groupby("year").doy.apply(list).tolist() == [list(range(1, 366))] * 2
 
 
@@ -180,8 +184,8 @@ def test_the_middle_stand_is_one_that_could_be_drawn():
 
 
 def test_a_site_without_stems_keeps_no_living_carbon():
-    table = simulate(initial={"density_stems_ha": 0.0, "biomass_kgc_m2": 5.0}, years=2)
-    assert table.biomass_kgc_m2[0] == 0.0 and table.mortality_kgc_m2[0] == pytest.approx(5.0)
+    table = simulate(initial={"density_stems_ha": 0.0}, years=2)
+    assert table.biomass_kgc_m2[0] == 0.0 and table.mortality_kgc_m2[0] > 0.5  # what was drawn for it
     assert table.gpp_kgc_m2[0] == table.understorey_gpp_kgc_m2[0] > 0.0
     assert table.density_stems_ha[0] > 0.0  # recruits
 
@@ -467,6 +471,18 @@ FORCINGS = {
     "no rows": (lambda: observed().iloc[:0], r"0 rows"),
     "an array": (lambda: observed().to_numpy(), r"DataFrame with a DatetimeIndex"),
     "no times": (lambda: observed().reset_index(drop=True), r"DataFrame with a DatetimeIndex"),
+    "a time zone": (
+        lambda: observed().tz_localize("UTC"),
+        r"its times have the time zone UTC; local solar time without one is allowed, which sim.read_forcing makes",
+    ),
+    "days": (
+        lambda: observed(minutes=1440),
+        r"it is daily; sim.half_hours\(forcing, latitude_deg\) makes half-hours of it",
+    ),
+    "a sun at midnight": (
+        lambda: observed(shortwave_w_m2=np.roll(observed().shortwave_w_m2, 3)),
+        r"its sun is highest at \d\d:\d\d; times of local solar time, highest at 12:00, are allowed",
+    ),
 }
 
 
@@ -487,6 +503,100 @@ def test_a_part_of_a_year_is_not_repeated():
         simulate(forcing=observed(90), years=2)
 
 
+# ------------------------------------------------------------------------------------------- doors of a scientist
+
+
+def test_nothing_has_to_be_given():
+    table = sim.simulate(years=2, time_step_minutes=240)
+    pd.testing.assert_frame_equal(table, sim.simulate(None, 12, seed=0, years=2, time_step_minutes=240))
+
+
+def test_tables_have_dates_units_and_net_exchange():
+    annual, daily = (sim.simulate(years=4, output=output, time_step_minutes=240) for output in ("annual", "daily"))
+    assert annual.index.equals(pd.DatetimeIndex([f"{y}-01-01" for y in range(2025, 2029)], name="time"))
+    assert len(daily) == 4 * 365 and pd.Timestamp("2028-02-29") not in daily.index
+    assert (daily.index[[0, -1]] == pd.DatetimeIndex(["2025-01-01", "2028-12-31"])).all()
+    np.testing.assert_array_equal(daily.index.year, 2025 + daily.year)
+    np.testing.assert_allclose(daily.nee_kgc_m2.groupby(daily.index.year).sum(), annual.nee_kgc_m2, rtol=1e-9)
+    respired = annual.autotrophic_respiration_kgc_m2 + annual.heterotrophic_respiration_kgc_m2
+    np.testing.assert_allclose(annual.nee_kgc_m2, respired - annual.gpp_kgc_m2, rtol=1e-12)
+    for table in (annual, daily):
+        assert set(table.attrs["units"]) == set(table)
+    assert daily.attrs["units"]["nee_kgc_m2"] == "kgC m-2" and daily.attrs["units"]["snow_depth_m"] == "m"
+
+
+def test_dates_and_years_are_the_forcings():
+    two = pd.concat([observed(start="2015-01-01"), observed(366, start="2016-01-01")])
+    table = sim.simulate(forcing=two, output="daily", time_step_minutes=240)
+    dates = pd.date_range("2015-01-01", "2016-12-31").drop("2016-02-29")
+    np.testing.assert_array_equal(table.index, dates)
+    again = sim.simulate(forcing=two, years=3, time_step_minutes=240)
+    assert again.index.year.tolist() == [2015, 2016, 2017]
+    part = sim.simulate(forcing=observed(40, start="2015-01-01"), output="daily", time_step_minutes=240)
+    np.testing.assert_array_equal(part.index, dates[:40])
+    assert len(sim.simulate(forcing=observed())) == 1  # its steps are the forcing's, where they are longer than 30 min
+
+
+def test_latitude_and_climate_are_the_forcings_where_they_are_not_given():
+    forcing = observed()
+    forcing.attrs["site"] = {"latitude_deg": 66.0, "mean_annual_temperature_c": -3.0}
+    told = simulate(forcing=forcing)
+    plain = observed()
+    pd.testing.assert_frame_equal(told, simulate(forcing.attrs["site"], forcing=plain))
+    assert not told.equals(simulate(forcing=plain))
+    assert not told.equals(simulate({"mean_annual_temperature_c": -9.0}, forcing=forcing))
+    with pytest.raises(
+        ValueError, match=r"latitude_deg = 60: the forcing is of 66, and the sun has to be that of its place"
+    ):
+        simulate({"latitude_deg": 60.0}, forcing=forcing)
+
+
+@pytest.mark.parametrize("initial", [{}, {"conifer_mature_stems_ha": 600.0, "deciduous_young_stems_ha": 500.0}])
+def test_a_stand_that_is_held_is_every_year_the_same(initial):
+    site = {"fire_base_probability": 0.05, "insect_base_probability": 1.0, "natural_mortality": 0.2}
+    table = simulate(site, None, hold_stand=True, years=5, initial=initial)
+    for name in ("density_stems_ha", "conifer_fraction", "max_lai", "crown_cover"):
+        assert table[name].nunique() == 1, name
+    starts = table.biomass_kgc_m2 - table.biomass_change_kgc_m2
+    np.testing.assert_allclose(starts, starts[0], rtol=1e-12)
+    assert table.gpp_kgc_m2.nunique() == 5 and table.dead_stems_ha.max() == 0.0
+    free = simulate({**site, **HELD_STAND}, years=5, initial=initial)
+    pd.testing.assert_frame_equal(free[:1], table[:1])  # the first year is that of a stand where nobody dies
+    assert free.max_lai.nunique() > 1
+
+
+@pytest.mark.parametrize("initial", [{"conifer_mature_stems_ha": 900.0}, {"density_stems_ha": 1200.0}])
+def test_leaf_area_is_the_one_that_is_given(initial):
+    initial = {"biomass_kgc_m2": 6.0, **initial}
+    for lai in (0.7, 2.0):
+        table = simulate(initial=initial, lai=lai, seed=3)
+        assert table.max_lai[0] == pytest.approx(lai, rel=1e-9)
+    as_it_is = simulate(initial=initial, seed=3)
+    pd.testing.assert_frame_equal(simulate(initial=initial, seed=3, lai=as_it_is.max_lai[0]), as_it_is, rtol=1e-6)
+
+
+def test_a_boundary_in_degrees_is_the_sites():
+    by_number = simulate(boundary=-2.0)
+    pd.testing.assert_frame_equal(by_number, simulate({"deep_boundary_temperature_k": 273.15 - 2.0}))
+
+
+def test_a_step_of_more_than_two_hours_is_refused():
+    code = "import sim; sim.simulate(years=1, time_step_minutes=180)"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    message = (
+        "ValueError: time_step_minutes = 180: a divisor of 1440 is allowed, such as 10, 15, 30, 60, and at most 120"
+    )
+    assert result.stderr.splitlines()[-1] == message
+
+
+def test_the_first_run_says_that_it_compiles(monkeypatch, capsys):
+    simulate()
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(sys.modules["sim.simulate"], "is_compiled", lambda lanes: False)
+    simulate()
+    assert capsys.readouterr().err == "compiling the simulator, once for this processor: about a minute\n"
+
+
 # ------------------------------------------------------------------------------------------------------ refusals
 
 BAD = {
@@ -503,8 +613,9 @@ BAD = {
     "action of float": ({"actions": 12.0}, r"actions of type float64: integers"),
     "action of bool": ({"actions": True}, r"actions of type bool: integers"),
     "action of text": ({"actions": "plant"}, r"integers in \[0, 25\)"),
-    "too many actions": ({"actions": [12, 12]}, r"actions of shape \(2,\)"),
+    "too many actions": ({"actions": [12, 12]}, r"actions of shape \(2,\): one integer for each of 1 years is allowed"),
     "years 0": ({"years": 0}, r"years: a positive integer is allowed, got 0"),
+    "years without end": ({"years": 10**9}, r"years = 1000000000: at most 10000 are allowed"),
     "years of float": ({"years": 2.0}, r"years: a positive integer is allowed, got 2.0"),
     "seed -1": ({"seed": -1}, r"seed.*-1"),
     "seed of float": ({"seed": 1.5}, r"seed.*1.5"),
@@ -513,7 +624,33 @@ BAD = {
     "time step 0": ({"time_step_minutes": 0}, r"time_step_minutes: a positive integer is allowed, got 0"),
     "time step of float": ({"time_step_minutes": 30.0}, r"time_step_minutes: .*30.0"),
     "unknown backend": ({"backend": "gpu"}, r"backend 'gpu': allowed are numba, python, cuda"),
-    "unknown output": ({"output": "weekly"}, r"output 'weekly': allowed are annual, daily"),
+    "unknown output": ({"output": "weekly"}, r"output 'weekly': allowed are annual, daily, xarray"),
+    "held by a number": ({"hold_stand": 1}, r"hold_stand: True or False is allowed, got 1"),
+    "held and planted": ({"hold_stand": True, "actions": 24}, r"hold_stand: .* neither planted nor cut; actions=None"),
+    "leaf area of text": ({"lai": "high"}, r"lai = 'high': a number in \(0, 15\]"),
+    "leaf area of none": ({"lai": 0.0}, r"lai = 0.0: a number in \(0, 15\]"),
+    "leaf area without trees": (
+        {"lai": 2.0, "initial": {"density_stems_ha": 0.0}},
+        r"lai = 2: the first stand has no crowns; give stems by initial=",
+    ),
+    "more leaves than crowns can have": (
+        {"lai": 9.0, "initial": {"density_stems_ha": 200.0}},
+        r"lai = 9: crowns cover 0.21 of the ground, so \[0.045, 1.8\] m2 m-2 is allowed; more or older",
+    ),
+    "unknown boundary": ({"boundary": "warm"}, r"boundary 'warm': allowed are sampled, balanced"),
+    "boundary in kelvin": ({"boundary": 270.0}, r"boundary = 270: a temperature in \[-13.15, 11.85\] degC, or a name"),
+    "two boundaries": (
+        {"boundary": -1.0, "site": {"deep_boundary_temperature_k": 270.0}},
+        r"boundary = -1: the site has deep_boundary_temperature_k too",
+    ),
+    "carbon of no stems": (
+        {"initial": {"density_stems_ha": 0.0, "biomass_kgc_m2": 5.0}},
+        r"initial biomass_kgc_m2 = 5: without stems, 0 is allowed",
+    ),
+    "carbon of no stems of a class": (
+        {"initial": {"conifer_old_stems_ha": 0, "biomass_kgc_m2": 5.0}},
+        r"initial biomass_kgc_m2 = 5: without stems, 0 is allowed",
+    ),
     "unknown stock": ({"initial": {"carbon": 1}}, r"unknown initial stock 'carbon'; allowed: density_stems_ha"),
     "negative stock": ({"initial": {"soil_kgc_m2": -1}}, r"initial soil_kgc_m2 = -1: a number in \[0, 100\]"),
     "stock not a number": ({"initial": {"soil_kgc_m2": float("nan")}}, r"initial soil_kgc_m2 = nan"),

@@ -5,8 +5,8 @@ import numpy as np
 import sim
 from analysis.validation.held_stands import NO_CHANGE
 from sim.spin_up import BOUNDARY
-from sim.stands import HELD_IN_SPIN_UP
-from sim.state import PARAMETER_NAMES, STATE, STATE_NAMES
+from sim.stands import HELD_COLUMNS
+from sim.state import PARAMETER_NAMES
 
 YEARS = 10
 UNDISTURBED = {"fire": False, "insects": False}
@@ -19,12 +19,11 @@ def run_held(sites: list[dict], seeds: list, weather: str = "paper", years: int 
     """
     stands = sim.Stands(len(sites), mechanisms=UNDISTURBED, boundary="balanced", weather=weather)
     stands.start(np.arange(len(sites)), sites, seeds)
-    held = [STATE_NAMES.index(name) for name in HELD_IN_SPIN_UP] + list(range(len(STATE), stands.state.shape[1]))
-    first = stands.state[:, held].copy()
+    first = stands.state[:, HELD_COLUMNS].copy()
     column = sim.RECORD_NAMES.index
     heat = np.zeros(len(sites))
     for _ in range(years):
         record = stands.step(np.full(len(sites), NO_CHANGE))
-        stands.state[:, held] = first
+        stands.state[:, HELD_COLUMNS] = first
         heat += record[:, column("boundary_warming_mj_m2")] - record[:, column("boundary_cooling_mj_m2")]
     return stands.parameters[:, PARAMETER_NAMES.index(BOUNDARY)], heat / years

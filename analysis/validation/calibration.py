@@ -14,6 +14,7 @@ from analysis.validation import climate_records, document, tower_comparison, tow
 from analysis.validation.climate_records import SEASONS, Climate
 from analysis.validation.document import Miss, number
 from analysis.validation.scores import skill
+from sim.io import longwave
 from sim.parameters import CONSTANTS
 from sim.physical_constants import FREEZING_POINT_K
 
@@ -40,7 +41,7 @@ class Half:
             days.assign(
                 season=climate_records.season_of(days.index),
                 wet=days["precipitation_mm"] >= WET_MM,
-                extraterrestrial=climate_records.extraterrestrial(days.index, climate.latitude_deg),
+                extraterrestrial=longwave.extraterrestrial(days.index, climate.latitude_deg),
                 cloud=climate_records.cloud_term(days),
                 humidity=days["vapour_pressure_hpa"] / climate_records.saturation(days["air_temperature_c"]),
             )

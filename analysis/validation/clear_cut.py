@@ -9,7 +9,7 @@ import numpy as np
 
 import sim
 from analysis.validation.held_stands import NO_CHANGE
-from sim.stands import HELD_IN_SPIN_UP
+from sim.stands import HELD_COLUMNS
 from sim.state import DAILY_NAMES, STATE, STATE_NAMES
 
 YEARS_BEFORE, YEARS_AFTER = 3, 3
@@ -47,18 +47,17 @@ def cut(site_overrides: dict, stand: dict, sites: int) -> Cut:
     parameters = [sim.sample_site(k, site_overrides) for k in numbers]
     seeds = [sim.episode_seeds(k) for k in numbers]
     stands.start(np.arange(len(numbers)), parameters, seeds, initial=dict.fromkeys(range(len(numbers)), stand))
-    held = [STATE_NAMES.index(name) for name in HELD_IN_SPIN_UP] + list(range(len(STATE), stands.state.shape[1]))
     trees = [STATE_NAMES.index(f"{species}_biomass") for species in ("conifer", "deciduous")]
     first = stands.state.copy()
 
     actions = np.full(len(numbers), NO_CHANGE)
     for _ in range(YEARS_BEFORE):
         stands.step(actions)
-        stands.state[:, held] = first[:, held]
+        stands.state[:, HELD_COLUMNS] = first[:, HELD_COLUMNS]
     first[sites:, trees + list(range(len(STATE), first.shape[1]))] = 0.0
     heat, thaw, top = [], [], []
     for _ in range(YEARS_AFTER):
-        stands.state[:, held] = first[:, held]
+        stands.state[:, HELD_COLUMNS] = first[:, HELD_COLUMNS]
         record, days = stands.step(actions, daily=True)
         heat.append(days[:, MAY_TO_AUGUST, DAILY_NAMES.index("ground_heat_mj_m2")].sum(axis=1))
         thaw.append(record[:, sim.RECORD_NAMES.index("active_layer_depth_m")].copy())

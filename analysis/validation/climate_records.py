@@ -6,19 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.validation import disaggregation, poker_flat, towers
+from analysis.validation import poker_flat, towers
 from sim import radiation
+from sim.io import disaggregation
 from sim.jit import uncompiled
 from sim.parameters import CONSTANTS
-from sim.physical_constants import FREEZING_POINT_K, PSYCHROMETRIC_PER_HPA, SOLAR_CONSTANT
-from sim.weather import (
-    saturation_pressure,
-    saturation_slope,
-    sky_emissivity,
-    solar_distance_factor,
-)
+from sim.physical_constants import FREEZING_POINT_K, PSYCHROMETRIC_PER_HPA
+from sim.weather import saturation_pressure, saturation_slope, sky_emissivity
 
-black_body, distance_factor = uncompiled(radiation.black_body), uncompiled(solar_distance_factor)
+black_body = uncompiled(radiation.black_body)
 emissivity = uncompiled(sky_emissivity)
 saturation_of, slope_of = uncompiled(saturation_pressure), uncompiled(saturation_slope)
 
@@ -100,16 +96,6 @@ def season_of(index: pd.DatetimeIndex) -> np.ndarray:
     """Name of each day's season."""
     names = {month: name for name, months in SEASONS.items() for month in months}
     return np.array([names[month] for month in index.month])
-
-
-def extraterrestrial(index: pd.DatetimeIndex, latitude_deg: float) -> np.ndarray:
-    """Daily mean shortwave at the top of the atmosphere [W m-2]."""
-    latitude = math.radians(latitude_deg)
-    tilt = np.array([disaggregation.declination(day - 1) for day in index.day_of_year])[:, None]
-    distance = np.array([distance_factor(day - 1) for day in index.day_of_year])
-    angle = 2.0 * math.pi * (disaggregation.HOURS - 12.0) / 24.0
-    height = math.sin(latitude) * np.sin(tilt) + math.cos(latitude) * np.cos(tilt) * np.cos(angle)
-    return SOLAR_CONSTANT * distance * np.maximum(height, 0.0).mean(axis=1)
 
 
 def cloud_term(days: pd.DataFrame) -> pd.Series:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 import sim
-from sim.stands import HELD_IN_SPIN_UP, STATE_NAMES
+from sim.stands import HELD_COLUMNS
 from sim.state import DAILY_NAMES, DAYS
 
 NO_CHANGE = 10  # action 5 * 2 + 0: density index 2 leaves the stand alone
@@ -68,14 +68,13 @@ def hold(
     parameters = [sim.sample_site(k, site_overrides) for k in range(sites)]
     seeds = [sim.episode_seeds(k) for k in range(sites)]
     stands.start(numbers, parameters, seeds, initial=dict.fromkeys(range(sites), kind))
-    held = [STATE_NAMES.index(name) for name in HELD_IN_SPIN_UP] + list(range(len(STATE_NAMES), stands.state.shape[1]))
-    first = stands.state[:, held].copy()
+    first = stands.state[:, HELD_COLUMNS].copy()
 
     annual, months, daily = [], [], []
     actions = np.full(sites, NO_CHANGE)
     for year in range(skipped + years):
         record, days = stands.step(actions, daily=True)
-        stands.state[:, held] = first
+        stands.state[:, HELD_COLUMNS] = first
         if year < skipped:
             continue
         annual.append(record.copy())

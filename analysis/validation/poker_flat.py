@@ -1,13 +1,14 @@
 """US-Prr, Poker Flat Research Range: black spruce on permafrost in interior Alaska, 2011-14.
 
-The published fluxes are daily, so the weather that drives the simulator is disaggregated (`disaggregation.py`);
+The published fluxes are daily, so the weather that drives the simulator is disaggregated (`sim.half_hours`);
 spring 2013 is also there in half-hours, and tells what that costs. Winter precipitation is ERA-Interim's: the gauge
 catches half of it. `analysis/observations/README.md` has sources, licence and columns.
 """
 
 import pandas as pd
 
-from analysis.validation import disaggregation, towers
+from analysis.validation import towers
+from sim.io import disaggregation
 
 SITE = "US-Prr"
 LATITUDE_DEG = 65.124

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import pandas as pd
 
 from analysis.validation import (
-    disaggregation,
     document,
     poker_flat,
     tower_comparison,
@@ -16,6 +15,7 @@ from analysis.validation import (
 from analysis.validation.document import Miss, Part, number, percent
 from analysis.validation.scores import skill
 from analysis.validation.tower_comparison import QUANTITIES
+from sim.io import disaggregation
 from sim.physical_constants import LATENT_HEAT_FUSION, MJ_PER_DAY, WATER_DENSITY
 from sim.state import DAYS
 
@@ -207,7 +207,7 @@ def _poker_flat_text(comparison: Comparison, repeats: int) -> tuple[str, list[Mi
     text = f"""### US-Prr, Poker Flat, 2011-14
 
 Black spruce, 2.4 m tall, on permafrost in interior Alaska, 65.1 N. The published weather is daily: it is spread over
-the day as `analysis/validation/disaggregation.py` says (temperature by a cosine of half-range
+the day as `sim/io/disaggregation.py` says (temperature by a cosine of half-range
 {number(_spring_cycle().half_range_per_shortwave, 3)} K per W m⁻² of the day's shortwave with its peak at
 {number(_spring_cycle().peak_hour, 1)} h, both from the half-hourly spring of 2013; shortwave by the sun's height).
 Precipitation of frosty days is ERA-Interim's, because the gauge catches half of it. GPP and respiration are the

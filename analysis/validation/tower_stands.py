@@ -2,14 +2,7 @@
 
 from dataclasses import dataclass, field
 
-#: The stand stays the one of the inventory while soil and snow come into balance.
-LASTING = {
-    "natural_mortality": 0.0,
-    "density_dependent_mortality": 0.0,
-    "recruitment_rate": 0.0,
-    "fire_base_probability": 0.0,
-    "insect_base_probability": 0.0,
-}
+from sim.simulate import HELD_STAND
 
 
 @dataclass(frozen=True)
@@ -33,7 +26,7 @@ SE_SVB = TowerStand(
         # Needles of the mean stem of each species, 17-21 cm thick and 17 m tall (Marklund 1988), with the specific
         # leaf areas of Harkonen et al. (2015), give the conifers a leaf area of 5.
         "max_lai_conifer": 5.0,
-        **LASTING,
+        **HELD_STAND,
     },
     initial={
         "conifer_mature_stems_ha": 950.0,
@@ -57,7 +50,7 @@ US_PRR = TowerStand(
         "deep_boundary_temperature_k": 272.15,  # permafrost at about -1 degC
         "max_lai_conifer": _SPRUCE_LAI / _SPRUCE_COVER,
         "canopy_roughness_m": 0.37,  # Chu et al. 2021, as used by Ikawa et al. 2024
-        **LASTING,
+        **HELD_STAND,
     },
     constants={
         "crown_area_conifer_m2": 0.60,

@@ -1,4 +1,4 @@
-"""Half-hourly weather from daily means, for a tower whose record is daily.
+"""Half-hourly weather from daily means, for a record that is daily.
 
 Temperature is the day's mean and a cosine whose half-range is in proportion to the day's mean shortwave, shortwave
 follows the sun's height, vapour pressure, longwave, wind and precipitation hold for the day. Daily means, and the
@@ -29,6 +29,10 @@ class DiurnalCycle:
     peak_hour: float
 
 
+#: Of a boreal forest: the whole year 2019 at Svartberget (`diurnal_cycle` of its record), to three digits.
+FOREST_CYCLE = DiurnalCycle(half_range_per_shortwave=0.0152, peak_hour=15.3)
+
+
 def diurnal_cycle(air: pd.Series, shortwave: pd.Series) -> DiurnalCycle:
     """The cycle of a half-hourly record of whole days [degC, W m-2], indexed by local solar time.
 
@@ -44,11 +48,12 @@ def diurnal_cycle(air: pd.Series, shortwave: pd.Series) -> DiurnalCycle:
     return DiurnalCycle(math.hypot(*slopes), 24.0 * peak / (2.0 * math.pi))
 
 
-def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle) -> pd.DataFrame:
+def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = FOREST_CYCLE) -> pd.DataFrame:
     """Half-hourly forcing of the simulator (`sim.state.FORCING`) from daily means, indexed by solar time.
 
-    daily : a row a day, indexed by date, with air_temperature_c, vapour_pressure_deficit_hpa (mean over the day),
-    wind_speed_m_s, shortwave_w_m2, longwave_w_m2, precipitation_mm (sum). 29 February is dropped.
+    daily : a row a day, indexed by date, with air_temperature_c, vapour_pressure_deficit_hpa (mean over the day) or
+    vapour_pressure_hpa, wind_speed_m_s, shortwave_w_m2, longwave_w_m2,
+    precipitation_mm (sum). 29 February is dropped.
 
     Shortwave of a day whose sun does not rise is spread evenly, so that the mean stays. Relative humidity is over
     water and at most 1: vapour beyond that, on cold nights, is dew. Raises ValueError, naming column and day, for a
@@ -65,11 +70,16 @@ def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle) ->
     swing = cycle.half_range_per_shortwave * mean["shortwave_w_m2"]
     air = mean["air_temperature_c"] + swing * np.cos(2.0 * math.pi * (HOURS - cycle.peak_hour) / 24.0)
     saturation = np.vectorize(saturation_water)(air)
-    vapour = saturation.mean(axis=1, keepdims=True) - mean["vapour_pressure_deficit_hpa"]
-    if (vapour <= 0.0).any():
-        day = daily.index[(vapour <= 0.0).ravel()][0]
-        deficit = daily.loc[day, "vapour_pressure_deficit_hpa"]
-        raise ValueError(f"daily record: a vapour pressure deficit of {deficit:g} hPa on {day:%Y-%m-%d} is too large")
+    if "vapour_pressure_hpa" in mean:
+        vapour = mean["vapour_pressure_hpa"]
+    else:
+        vapour = saturation.mean(axis=1, keepdims=True) - mean["vapour_pressure_deficit_hpa"]
+        if (vapour <= 0.0).any():
+            day = daily.index[(vapour <= 0.0).ravel()][0]
+            deficit = daily.loc[day, "vapour_pressure_deficit_hpa"]
+            raise ValueError(
+                f"daily record: a vapour pressure deficit of {deficit:g} hPa on {day:%Y-%m-%d} is too large"
+            )
     shape = sun_shape(daily.index, latitude_deg)
     columns = {
         "air_temperature_c": air,

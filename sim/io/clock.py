@@ -1,0 +1,105 @@
+"""Times of a record: read, regular, and turned into local mean solar time, in which the simulator's sun is highest at
+noon."""
+
+import re
+
+import numpy as np
+import pandas as pd
+
+from sim.io.columns import Choice
+from sim.io.table import Table
+
+DAY = 1440  # minutes
+MOST_MINUTES = 120
+_FORMATS = {8: "%Y%m%d", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
+_WITH_ZONE = re.compile(r":\d\d(\.\d+)?\s?(Z|[+-]\d\d(:?\d\d)?)$")
+
+
+def read_times(table: Table, texts: pd.Series, name: str) -> pd.DatetimeIndex:
+    """The times of a column, one a row. Raises ValueError naming the first row that has none."""
+    if pd.api.types.is_datetime64_any_dtype(texts):
+        times = pd.Series(texts)
+    else:
+        text = texts.astype("string").str.strip().str.replace(r"\.0$", "", regex=True)
+        known = text.dropna()
+        first = known.iloc[0] if len(known) else ""
+        if first.isdigit():
+            times = pd.to_datetime(text, format=_FORMATS.get(len(first), "%Y%m%d%H%M"), errors="coerce")
+        elif _WITH_ZONE.search(first):
+            times = pd.to_datetime(text, format="ISO8601", errors="coerce", utc=True)
+        else:
+            times = pd.to_datetime(text.where(~text.str.contains(_WITH_ZONE).fillna(False)), errors="coerce")
+    wrong = times.isna().to_numpy()
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ValueError(
+            f"{table.where(row)}: {name} is {texts.iloc[row]!r}; a time as 201906031230 or 2019-06-03 12:30 is allowed"
+        )
+    return pd.DatetimeIndex(times)
+
+
+def interval_of(table: Table, times: pd.DatetimeIndex) -> int:
+    """Minutes from a row to the next. Raises ValueError for times that are twice, out of order or off the grid, and for
+    an interval that is neither a day nor at most two hours."""
+    if len(times) < 2:
+        raise ValueError(f"{table.name}: {len(times)} rows; whole days at a regular interval are allowed")
+    minutes = np.diff(times.to_numpy()) / np.timedelta64(1, "m")
+    back = np.flatnonzero(minutes <= 0.0)
+    if len(back):
+        row = int(back[0]) + 1
+        first = int(np.argmax(times == times[row]))
+        if first < row:
+            raise ValueError(f"{table.where(row)}: {_text(times[row])} is there twice, first in {table.where(first)}")
+        raise ValueError(
+            f"{table.where(row)}: {_text(times[row])} follows {_text(times[row - 1])}; times have to increase"
+        )
+    steps, counts = np.unique(minutes, return_counts=True)
+    interval = steps[np.argmax(counts)]
+    if interval != DAY and (interval > MOST_MINUTES or DAY % interval or interval % 1):
+        each = f"{interval / DAY:g} days" if interval >= DAY else f"{interval:g} minutes"
+        raise ValueError(
+            f"{table.name}: a row every {each}; a day, or a divisor of it of at most 120 minutes, is allowed"
+        )
+    off = np.flatnonzero(((times - times[0]) / pd.Timedelta(minutes=interval) % 1).to_numpy())
+    if len(off):
+        row = int(off[0])
+        raise ValueError(f"{table.where(row)}: {_text(times[row])} is not on the record's grid of {interval:g} minutes")
+    return int(interval)
+
+
+def kind_of_times(table: Table, choice: Choice, interval: int) -> str:
+    """What the times are, once the interval is known: "start", "end", "instant" or "day"."""
+    if interval == DAY:
+        return "day"
+    if choice.time_kind == "day":
+        raise ValueError(
+            f"{table.name}: whether {choice.time} is an interval's start or its end is not clear; "
+            f"say columns={{'time_start': {choice.time!r}}} or {{'time_end': {choice.time!r}}}"
+        )
+    return choice.time_kind
+
+
+def minutes_ahead(longitude_deg: float, utc_offset_h: float) -> float:
+    """Minutes that local mean solar time is ahead of a clock that is so many hours ahead of UTC."""
+    return 60.0 * (longitude_deg / 15.0 - utc_offset_h)
+
+
+def noon_of(starts: pd.DatetimeIndex, interval: int, shortwave: np.ndarray) -> float | None:
+    """Hour of the record's clock at which its sun is highest: the mean hour of the sunlight, on a circle. None where
+    there is too little light, or no course of the day in it."""
+    hour = (starts.hour * 60 + starts.minute + 0.5 * interval).to_numpy() / 60.0
+    light = np.where(np.isnan(shortwave), 0.0, np.maximum(shortwave, 0.0))
+    total = light.sum()
+    if total <= 0.0:
+        return None
+    mean = (light * np.exp(2j * np.pi * hour / 24.0)).sum() / total
+    return float(np.angle(mean) * 24.0 / (2.0 * np.pi) % 24.0) if abs(mean) > 0.2 else None
+
+
+def hours_apart(one: float, other: float) -> float:
+    """From the other hour to the one, by the shorter way round the clock, -12 to 12."""
+    return (one - other + 12.0) % 24.0 - 12.0
+
+
+def _text(time) -> str:
+    return f"{time:%Y-%m-%d %H:%M}"

@@ -1,0 +1,253 @@
+"""What the field calls the columns of a record, in which units, and between which limits their values lie."""
+
+import difflib
+import re
+from dataclasses import dataclass
+
+#: Unit -> (factor, offset) into ours, by kind of quantity. Per interval: the factor is divided by its seconds.
+_TEMPERATURE = {"degC": (1.0, 0.0), "K": (1.0, -273.15)}
+_PRESSURE = {"hPa": (1.0, 0.0), "kPa": (10.0, 0.0), "Pa": (0.01, 0.0)}
+_RADIATION = {"W m-2": (1.0, 0.0), "J m-2": (1.0, 0.0), "kJ m-2": (1e3, 0.0), "MJ m-2": (1e6, 0.0)}
+PER_INTERVAL = ("J m-2", "kJ m-2", "MJ m-2")  # to be divided by the seconds of the interval
+RATES = ("kg m-2 s-1", "mm s-1")  # to be multiplied by them
+_UNITS = {
+    "air_temperature": _TEMPERATURE,
+    "deficit": _PRESSURE,
+    "relative_humidity": {"%": (0.01, 0.0), "1": (1.0, 0.0)},
+    "dew_point": _TEMPERATURE,
+    "wind_speed": {"m s-1": (1.0, 0.0)},
+    "eastward_wind": {"m s-1": (1.0, 0.0)},
+    "northward_wind": {"m s-1": (1.0, 0.0)},
+    "shortwave": _RADIATION,
+    "longwave": _RADIATION,
+    "precipitation": {"mm": (1.0, 0.0), "m": (1e3, 0.0), **dict.fromkeys(RATES, (1.0, 0.0))},
+    "air_pressure": _PRESSURE,
+}
+
+#: Kind -> (our unit, lowest and highest value allowed in it). Shortwave below 0 is a sensor's offset at night.
+LIMITS = {
+    "air_temperature": ("degC", -75.0, 50.0),
+    "deficit": ("hPa", -0.5, 80.0),
+    "relative_humidity": ("1", 0.0, 1.1),
+    "dew_point": ("degC", -90.0, 40.0),
+    "wind_speed": ("m s-1", 0.0, 60.0),
+    "eastward_wind": ("m s-1", -60.0, 60.0),
+    "northward_wind": ("m s-1", -60.0, 60.0),
+    "shortwave": ("W m-2", -10.0, 1500.0),
+    "longwave": ("W m-2", 50.0, 600.0),
+    "precipitation": ("mm", -0.1, 200.0),
+    "air_pressure": ("hPa", 500.0, 1100.0),
+}
+
+#: Quantity -> column -> unit, the preferred first. Towers: FLUXNET (filled, consolidated `_F` before the rest), ICOS
+#: and AmeriFlux; reanalyses: ERA5-Land by its short and long names, and of the Earth Engine; last, our own names.
+NAMES = {
+    "air_temperature": {
+        **dict.fromkeys(("TA_F", "TA_F_MDS", "TA", "TA_PI_F", "TA_ERA"), "degC"),
+        **dict.fromkeys(("t2m", "2m_temperature", "temperature_2m"), "K"),
+        "air_temperature_c": "degC",
+    },
+    "humidity": {
+        **dict.fromkeys(("VPD_F", "VPD_F_MDS"), "hPa"),
+        **dict.fromkeys(("RH_F", "RH", "RH_PI_F"), "%"),
+        **dict.fromkeys(("VPD", "VPD_PI", "VPD_ERA"), "hPa"),
+        **dict.fromkeys(("d2m", "2m_dewpoint_temperature", "dewpoint_temperature_2m"), "K"),
+        "relative_humidity": "1",
+    },
+    "wind_speed": dict.fromkeys(("WS_F", "WS", "WS_PI_F", "WS_ERA", "si10", "wind_speed_m_s"), "m s-1"),
+    "shortwave": {
+        **dict.fromkeys(("SW_IN_F", "SW_IN_F_MDS", "SW_IN", "SW_IN_PI_F", "SW_IN_ERA"), "W m-2"),
+        **dict.fromkeys(
+            (
+                "ssrd",
+                "surface_solar_radiation_downwards",
+                "surface_solar_radiation_downwards_sum",
+                "surface_solar_radiation_downwards_hourly",
+            ),
+            "J m-2",
+        ),
+        "shortwave_w_m2": "W m-2",
+    },
+    "longwave": {
+        **dict.fromkeys(
+            ("LW_IN_F", "LW_IN_F_MDS", "LW_IN", "LW_IN_PI_F", "LW_IN_JSB_F", "LW_IN_JSB", "LW_IN_ERA"), "W m-2"
+        ),
+        **dict.fromkeys(
+            (
+                "strd",
+                "surface_thermal_radiation_downwards",
+                "surface_thermal_radiation_downwards_sum",
+                "surface_thermal_radiation_downwards_hourly",
+            ),
+            "J m-2",
+        ),
+        "longwave_w_m2": "W m-2",
+    },
+    "precipitation": {
+        **dict.fromkeys(("P_F", "P", "P_PI_F", "P_ERA"), "mm"),
+        **dict.fromkeys(("tp", "total_precipitation", "total_precipitation_sum", "total_precipitation_hourly"), "m"),
+        "precipitation_mm": "mm",
+    },
+    "air_pressure": {
+        **dict.fromkeys(("PA_F", "PA", "PA_PI_F", "PA_ERA"), "kPa"),
+        **dict.fromkeys(("sp", "surface_pressure"), "Pa"),
+    },
+    "eastward_wind": dict.fromkeys(("u10", "10m_u_component_of_wind", "u_component_of_wind_10m"), "m s-1"),
+    "northward_wind": dict.fromkeys(("v10", "10m_v_component_of_wind", "v_component_of_wind_10m"), "m s-1"),
+}
+TIMES = ("time_start", "time_end", "time")
+NEEDED = ("air_temperature", "humidity", "wind_speed", "shortwave", "precipitation")
+OF_REANALYSIS = re.compile(r"t2m|d2m|ssrd|strd|tp|sp|[uv]10|si10|.*2m.*|.*10m.*|surface_.*|total_precipitation.*")
+_POSITION = re.compile(r"(_\d+){1,3}|_\d+_\d+_A")  # of a sensor: horizontal, vertical, replicate
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a record that is used: its name, kind (a name of `LIMITS`) and unit, the column that says what was
+    filled, if there is one, and one of a reanalysis that the record has beside it."""
+
+    name: str
+    kind: str
+    unit: str
+    unit_given: bool = False
+    quality: str | None = None
+    reanalysis: str | None = None
+
+    def converted(self, values, seconds: float):
+        """Values of intervals of so many seconds in our unit."""
+        return self._into_ours(values, self.unit, seconds)
+
+    def hint(self, value: float, seconds: float) -> str:
+        """What unit a value beyond its limits might have, in words."""
+        _, low, high = LIMITS[self.kind]
+        for unit in _UNITS[self.kind]:
+            if unit != self.unit and low <= self._into_ours(value, unit, seconds) <= high:
+                return f"; if it is in {unit}, say units={{{self.name!r}: {unit!r}}}"
+        return ""
+
+    def _into_ours(self, values, unit: str, seconds: float):
+        factor, offset = _UNITS[self.kind][unit]
+        factor = factor / seconds if unit in PER_INTERVAL else factor * seconds if unit in RATES else factor
+        return factor * values + offset
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The columns of a record that are used, by quantity, and what was passed over."""
+
+    columns: dict[str, Column]
+    time: str
+    time_kind: str
+    notes: list[str]
+
+
+def choose(table: list[str], columns: dict | None, units: dict | None, empty) -> Choice:
+    """The columns to use of those that a record has.
+
+    columns : quantity -> column, in place of what we would take; units : column -> unit; empty : function of a column
+    that says whether it has no number. Raises ValueError naming what is missing, unknown or not clear.
+    """
+    columns, units = dict(columns or {}), dict(units or {})
+    for quantity, name in columns.items():
+        if quantity not in (*NAMES, *TIMES):
+            raise ValueError(f"columns: unknown quantity {quantity!r}; allowed: {', '.join((*NAMES, *TIMES))}")
+        if name not in table:
+            raise ValueError(f"columns: the record has no column {name!r} for {quantity}{_near(name, table)}")
+    for name in units:
+        if name not in table:
+            raise ValueError(f"units: the record has no column {name!r}{_near(name, table)}")
+
+    found: dict[str, Column] = {}
+    notes: list[str] = []
+    for quantity, names in NAMES.items():
+        name, passed_over = _pick(quantity, names, table, columns, empty)
+        notes += passed_over
+        if name:
+            found[quantity] = _column(quantity, name, names, table, units)
+    by_parts = "eastward_wind" in found and "northward_wind" in found
+    for quantity in NEEDED:
+        if quantity not in found and not (quantity == "wind_speed" and by_parts):
+            some = ", ".join(list(NAMES[quantity])[:8])
+            raise ValueError(
+                f"forcing: no column for {quantity.replace('_', ' ')}: none of {some}, ..; "
+                f"name yours: columns={{{quantity!r}: '..'}}; the record has {_some(table)}"
+            )
+    if "wind_speed" in found or not by_parts:
+        found = {quantity: column for quantity, column in found.items() if not quantity.endswith("ward_wind")}
+    used = {column.name for column in found.values()}
+    unused = [name for name in units if name not in used]
+    if unused:
+        raise ValueError(f"units: {unused[0]} is not used; used are {', '.join(sorted(used))}")
+    time, kind = _time(table, columns, any(OF_REANALYSIS.fullmatch(name) for name in used))
+    return Choice(found, time, kind, notes)
+
+
+def _pick(quantity, names, table, columns, empty) -> tuple[str | None, list[str]]:
+    """The column of a quantity, if the record has one, and which were passed over because they have no number."""
+    if quantity in columns:
+        name = columns[quantity]
+        if empty(name):
+            raise ValueError(f"forcing: column {name}, for {quantity}, has no number")
+        return name, []
+    notes: list[str] = []
+    for name in names:
+        there = [name] if name in table else _at_positions(name, table)
+        for column in there:
+            if not empty(column):
+                return column, notes
+            notes.append(f"{column} has no number and was passed over")
+    return None, notes
+
+
+def _at_positions(name: str, table: list[str]) -> list[str]:
+    """Columns of a quantity with the position of their sensor: the first one, or the only one."""
+    at = [column for column in table if column.startswith(name) and _POSITION.fullmatch(column[len(name) :])]
+    first = [f"{name}_1_1_1", f"{name}_1"]
+    best = [column for column in first if column in at] or at
+    if len(at) > 1 and best == at:
+        quantity = next(quantity for quantity, names in NAMES.items() if name in names)
+        raise ValueError(f"forcing: {', '.join(at)} could be {quantity}; name one: columns={{{quantity!r}: {at[0]!r}}}")
+    return best[:1]
+
+
+def _column(quantity, name, names, table, units) -> Column:
+    base = name if name in names else next((n for n in names if _POSITION.fullmatch(name.removeprefix(n))), None)
+    unit = units.get(name, names.get(base) if base else None)
+    kinds = ("deficit", "relative_humidity", "dew_point") if quantity == "humidity" else (quantity,)
+    allowed = [u for kind in kinds for u in _UNITS[kind]]
+    if unit is None:
+        raise ValueError(f"forcing: the unit of {name} is not known; say units={{{name!r}: ..}}: {', '.join(allowed)}")
+    kind = next((kind for kind in kinds if unit in _UNITS[kind]), None)
+    if kind is None:
+        raise ValueError(f"units: {name} in {unit!r}; allowed for {quantity}: {', '.join(allowed)}")
+    quality = f"{name}_QC" if f"{name}_QC" in table else None
+    reanalysis = next((n for n in names if n.endswith("_ERA") and n in table and n != name), None)
+    same = reanalysis if reanalysis and names[reanalysis] == unit else None
+    return Column(name, kind, unit, name in units, quality, same)
+
+
+def _time(table, columns, reanalysis: bool) -> tuple[str, str]:
+    """The column of times, and what they are: "start", "end", "instant" or "day"."""
+    given = [quantity for quantity in TIMES if quantity in columns]
+    if given:
+        kinds = {"time_start": "start", "time_end": "end", "time": "instant" if reanalysis else "day"}
+        return columns[given[0]], kinds[given[0]]
+    for name, kind in (("TIMESTAMP_START", "start"), ("TIMESTAMP_END", "end"), ("TIMESTAMP", "day")):
+        if name in table:
+            return name, kind
+    for name in ("valid_time", "time", "date", "Date", "datetime"):
+        if name in table:
+            return name, "instant" if reanalysis else "day"
+    raise ValueError(
+        "forcing: no column of times: none of TIMESTAMP_START, TIMESTAMP_END, TIMESTAMP, valid_time, time; name yours: "
+        f"columns={{'time_start': '..'}} or 'time_end'; the record has {_some(table)}"
+    )
+
+
+def _near(name, table) -> str:
+    near = difflib.get_close_matches(str(name), table, n=3, cutoff=0.5)
+    return f"; did you mean {', '.join(near)}?" if near else f"; it has {_some(table)}"
+
+
+def _some(table) -> str:
+    return ", ".join(table[:12]) + (f", .. ({len(table)} columns)" if len(table) > 12 else "")

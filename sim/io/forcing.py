@@ -1,0 +1,466 @@
+"""Forcing of the simulator from a tower's or a reanalysis' own file."""
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from sim.io import gaps as filling
+from sim.io import reanalysis
+from sim.io.clock import DAY, hours_apart, interval_of, kind_of_times, minutes_ahead, noon_of, read_times
+from sim.io.columns import LIMITS, NAMES, Choice, Column, choose
+from sim.io.disaggregation import FOREST_CYCLE, DiurnalCycle, half_hours, saturation_water
+from sim.io.longwave import cloud_cover, longwave
+from sim.io.plausible import check_sun, check_units
+from sim.io.table import Table, open_table
+from sim.parameters import SITE_PARAMETERS
+from sim.state import FORCING
+
+#: What the columns `<name>_flag` of a forcing say of each value.
+FLAGS = {
+    0: "as given",
+    1: "filled by its source",
+    2: "filled here: on a straight line, over at most three hours or a day",
+    3: "filled here: the mean of the same time of day in the weeks around",
+    4: "computed here: longwave from temperature, humidity and sunlight",
+    5: "set here to its limit: no negative light or rain, no humidity above saturation",
+    6: "repeated here from the day beside it, where the record's first or last day is not whole by solar time",
+}
+GIVEN, BY_SOURCE, BY_LINE, BY_MEAN, COMPUTED, LIMITED, REPEATED = FLAGS
+OURS = dict(
+    zip(("air_temperature", "humidity", "wind_speed", "shortwave", "longwave", "precipitation"), FORCING, strict=True)
+)
+GAPS = ("refuse", "fill")
+EDGE_HOURS = 12.5
+#: What is no more than a sum's or a sensor's last digit, and not worth a flag.
+ROUND_OFF = {"shortwave": 0.1, "precipitation": 1e-3}
+
+_of_each = np.vectorize(saturation_water, otypes=[float])
+
+
+def read_forcing(
+    source,
+    *,
+    latitude_deg,
+    longitude_deg=None,
+    utc_offset_h=None,
+    years=None,
+    gaps="refuse",
+    longest_gap_days=14,
+    columns=None,
+    units=None,
+    diurnal_cycle=FOREST_CYCLE,
+):
+    """Weather of a record as `sim.simulate(forcing=...)` takes it.
+
+    Parameters
+    ----------
+    source : CSV file (also .gz), NetCDF file, DataFrame or xarray Dataset of one place, with the columns of FLUXNET,
+        ICOS or AmeriFlux (TA_F, VPD_F, SW_IN_F, ..; -9999 is a gap) or of ERA5-Land (t2m, d2m, ssrd, ..; sums since
+        midnight UTC, or of each hour). Daily, or every 120 minutes and oftener. `sim.io.columns.NAMES` has all names.
+    latitude_deg, longitude_deg : of the place; the longitude, east positive, is needed unless the record is daily.
+    utc_offset_h : hours that the record's clock is ahead of UTC, without summer time (Sweden 1, Alaska -9); needed for
+        towers, unless they are daily. Times with a time zone are converted by it.
+    years : first and last year to use, or one; all by default. The result has whole years of 365 days, from 1 January
+        (29 February is dropped), or a part of one year.
+    gaps : "refuse" raises at the first; "fill" fills those of up to `longest_gap_days` days and flags them: by the
+        reanalysis column that the record has beside it, on a straight line over three hours, as the mean of the same
+        time of day in the weeks around (Falge et al. 2001); longwave by temperature, humidity and sunlight.
+    columns : names of your own: {"air_temperature": "Tair", "time_start": "begin", ..}.
+    units : of columns whose unit is not the usual one, or not known: {"Tair": "K"}.
+    diurnal_cycle : `sim.DiurnalCycle` of temperature, of a daily record.
+
+    Returns
+    -------
+    pandas.DataFrame, a row an interval (a daily record: a half-hour), indexed by the local solar time at which it
+    begins: the columns of `sim.state.FORCING`, and for each a column `<name>_flag` of `FLAGS`. Longwave that the record
+    does not have is computed (`sim.io.longwave`). `attrs["report"]` says in lines what is from where and what was done,
+    `attrs["site"]` what the record tells of the site: `sim.simulate` takes it from there.
+
+    Raises ValueError for what is missing, unknown, out of its limits or of another unit, naming line, time and column.
+    """
+    _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_gap_days, diurnal_cycle)
+    table = open_table(source)
+    rows = table.read(_recognised(table.columns, columns, units))
+    choice = choose(table.columns, columns, units, lambda name: _is_empty(rows[name]))
+    times = read_times(table, rows[choice.time], choice.time)
+    if times.tz is not None:
+        if utc_offset_h is not None:
+            raise ValueError("utc_offset_h: the record's times have a time zone already; None is allowed")
+        times, utc_offset_h = times.tz_convert("UTC").tz_localize(None), 0.0
+    interval = interval_of(table, times)
+    kind = kind_of_times(table, choice, interval)
+    report = list(choice.notes)
+
+    record, flags, row_of = _values(table, rows, choice, times, interval)
+    if kind == "instant":
+        utc_offset_h = 0.0 if utc_offset_h is None else utc_offset_h
+        record, flags, row_of, note = _between_times(table, record, flags, row_of, choice, interval)
+        report.append(note)
+    elif interval == DAY:
+        record.index = record.index.normalize()
+    elif kind == "end":
+        record.index = record.index - pd.Timedelta(minutes=interval)
+    flags.index = row_of.index = record.index
+    record = _derived(record, choice, flags)
+
+    check_units(table.name, record, choice.columns, latitude_deg, interval)
+    if interval != DAY:
+        if longitude_deg is None:
+            raise ValueError("longitude_deg is needed to tell solar time: degrees east, such as 19.8 or -147.5")
+        if utc_offset_h is None:
+            raise ValueError(_offset_needed(record, interval, longitude_deg))
+        ahead = minutes_ahead(longitude_deg, utc_offset_h)
+        check_sun(table.name, record, interval, 12.0 - ahead / 60.0, f"utc_offset_h = {utc_offset_h:g}")
+        shift = interval * round(ahead / interval)
+        for each in (record, flags, row_of):
+            each.index = each.index + pd.Timedelta(minutes=shift)
+        word = "ahead of" if shift >= 0 else "behind"
+        report.append(f"times are local solar time, {abs(shift)} minutes {word} the record's clock")
+
+    wanted = _whole_days(table, record.index, interval, years)
+    record, flags, row_of = record.reindex(wanted), flags.reindex(wanted), row_of.reindex(wanted)
+    _repeat_at_edges(record, flags, row_of, interval, report)
+    _fill(table, record, flags, row_of, choice, interval, gaps, longest_gap_days)
+    _add_longwave(record, flags, choice, latitude_deg)
+    site = _site(record, latitude_deg)
+    flags = flags.fillna(GIVEN).astype("int8")
+    if interval == DAY:
+        forcing, flags = _in_half_hours(record, flags, choice, latitude_deg, diurnal_cycle)
+        report.append(
+            "half-hours are made of days (`sim.half_hours`): temperature by a cosine, light by the sun's height"
+        )
+    else:
+        kept = ~_leap_day(record.index)
+        forcing, flags = record[list(OURS)].rename(columns=OURS)[kept], flags[list(OURS)][kept]
+    forcing = forcing.rename_axis("time").join(flags.rename(columns={q: f"{name}_flag" for q, name in OURS.items()}))
+    dropped = int(_leap_day(wanted).sum() * interval // DAY)
+    report += [f"29 February was dropped {dropped} times"] if dropped else []
+    pressure = choice.columns.get("air_pressure")
+    if pressure:
+        report.append(
+            f"air pressure is {record['air_pressure'].mean():.0f} hPa ({pressure.name}), which the simulator takes as "
+            "constants={'air_pressure_hpa': ..}"
+        )
+    forcing.attrs = {"report": _sources(forcing, choice) + report, "site": site, "flags": dict(FLAGS)}
+    return forcing
+
+
+# ------------------------------------------------------------------------------------------------------- arguments
+
+
+def _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_gap_days, diurnal_cycle) -> None:
+    latitude = SITE_PARAMETERS["latitude_deg"]
+    limits = {
+        "latitude_deg": (latitude_deg, latitude.physical_low, latitude.physical_high, False),
+        "longitude_deg": (longitude_deg, -180.0, 180.0, True),
+        "utc_offset_h": (utc_offset_h, -12.0, 14.0, True),
+        "longest_gap_days": (longest_gap_days, 0.0, 28.0, False),
+    }
+    for name, (value, low, high, optional) in limits.items():
+        if value is None and optional:
+            continue
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not low <= value <= high:
+            raise ValueError(f"{name} = {value!r}: a number in [{low:g}, {high:g}] is allowed")
+    if gaps not in GAPS:
+        raise ValueError(f"gaps {gaps!r}: allowed are {', '.join(GAPS)}")
+    if not isinstance(diurnal_cycle, DiurnalCycle):
+        raise ValueError(f"diurnal_cycle: a sim.DiurnalCycle is allowed, got {diurnal_cycle!r}")
+
+
+def _offset_needed(record: pd.DataFrame, interval: int, longitude_deg: float) -> str:
+    noon = noon_of(record.index, interval, record["shortwave"].to_numpy())
+    by_sun = (
+        "" if noon is None else f"; by the record's sun it is {round(hours_apart(noon, 12.0 - longitude_deg / 15.0)):g}"
+    )
+    return f"utc_offset_h is needed: hours that the record's clock is ahead of UTC, without summer time{by_sun}"
+
+
+# ---------------------------------------------------------------------------------------------------------- values
+
+
+def saturation(air_temperature: np.ndarray) -> np.ndarray:
+    """Saturation vapour pressure over water [hPa] at temperatures in degC; NaN where there is none."""
+    air_temperature = np.asarray(air_temperature)
+    known = ~np.isnan(air_temperature)
+    values = np.full(len(air_temperature), np.nan)
+    if known.any():
+        values[known] = _of_each(air_temperature[known])
+    return values
+
+
+def _recognised(names: list[str], columns: dict | None, units: dict | None) -> list[str]:
+    """Columns that may be of use, with their quality flags."""
+    for what, mapping in (("columns", columns), ("units", units)):
+        if mapping is not None and not isinstance(mapping, dict):
+            raise ValueError(f"{what}: a dict of names is allowed, got {type(mapping).__name__}")
+    known = {name for quantity in NAMES.values() for name in quantity}
+    wanted = {*(columns or {}).values(), "TIMESTAMP_START", "TIMESTAMP_END", "TIMESTAMP"}
+    wanted |= {"valid_time", "time", "date", "Date", "datetime"}
+    stems = tuple(f"{name}_" for name in known)
+    return [name for name in names if name in wanted or name in known or name.startswith(stems)]
+
+
+def _is_empty(texts: pd.Series) -> bool:
+    values = pd.to_numeric(texts, errors="coerce")
+    return bool((texts.isna() | (values <= -9990.0)).all())
+
+
+def _values(table: Table, rows: pd.DataFrame, choice: Choice, times: pd.DatetimeIndex, interval: int):
+    """The record's quantities in our units, their flags, and each one's row of the table (NaN where there is none), on
+    the record's own regular times. Raises ValueError for what is beyond its limits."""
+    index = pd.date_range(times[0], times[-1], freq=f"{interval}min")
+    seconds = 60.0 * interval
+    record, flags = pd.DataFrame(index=index), pd.DataFrame(index=index)
+    summed = choice.time_kind == "instant" and interval != DAY
+    for quantity, column in choice.columns.items():
+        values = column.converted(table.numbers(rows[column.name], column.name), seconds)
+        flag = np.zeros(len(values))
+        if column.quality:
+            quality = table.numbers(rows[column.quality], column.quality)
+            filled = quality < 1.0 if interval == DAY else quality >= 1.0
+            flag = np.where(filled, BY_SOURCE, flag)
+        if column.reanalysis:
+            beside = column.converted(table.numbers(rows[column.reanalysis], column.reanalysis), seconds)
+            record[f"{quantity}_beside"] = pd.Series(beside, index=times).reindex(index)
+        if not (summed and quantity in reanalysis.ACCUMULATED):
+            _check_limits(table, times, column, values, seconds)
+        record[quantity] = pd.Series(values, index=times).reindex(index)
+        flags[quantity] = pd.Series(flag, index=times).reindex(index).fillna(0)
+    if "longwave" not in record:
+        record["longwave"], flags["longwave"] = np.nan, 0
+    return record, flags, pd.Series(np.arange(len(times), dtype=float), index=times).reindex(index)
+
+
+def _check_limits(table, times, column: Column, values, seconds, rows=None) -> None:
+    unit, low, high = LIMITS[column.kind]
+    wrong = (values < low) | (values > high)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        where = table.where(k if rows is None else int(rows[k]))
+        unit = "" if unit == "1" else f" {unit}"
+        raise ValueError(
+            f"{where} ({times[k]:%Y-%m-%d %H:%M}): {column.name} is {values[k]:.6g}{unit}; "
+            f"[{low:g}, {high:g}]{unit} is allowed{column.hint(_unconverted(column, values[k], seconds), seconds)}"
+        )
+
+
+def _unconverted(column: Column, value: float, seconds: float) -> float:
+    zero, one = column.converted(0.0, seconds), column.converted(1.0, seconds)
+    return (value - zero) / (one - zero)
+
+
+def _between_times(table, record, flags, row_of, choice, interval):
+    """Means and sums of the intervals between the times of a reanalysis."""
+    seconds, times = 60.0 * interval, pd.DatetimeIndex(record.index)
+    sums = {q: record[q].to_numpy() for q in reanalysis.ACCUMULATED if q in choice.columns}
+    since_midnight = reanalysis.since_midnight(times, sums, seconds)
+    between = pd.DataFrame(index=times[:-1])
+    for quantity in record:
+        values = record[quantity].to_numpy()
+        if quantity not in reanalysis.ACCUMULATED:
+            between[quantity] = reanalysis.between(values)
+        else:
+            between[quantity] = reanalysis.of_intervals(times, values, seconds) if since_midnight else values[1:]
+    rows = row_of.to_numpy()[1:]
+    for quantity in sums:
+        values = between[quantity].to_numpy()
+        _check_limits(table, times[1:], choice.columns[quantity], values, seconds, np.nan_to_num(rows))
+    what = "since midnight UTC" if since_midnight else "of each interval"
+    note = f"light and precipitation are sums {what}; the rest are values at the times, averaged over each interval"
+    return between, flags.iloc[1:].copy(), pd.Series(rows, index=between.index), note
+
+
+def _derived(record: pd.DataFrame, choice: Choice, flags: pd.DataFrame) -> pd.DataFrame:
+    """Relative humidity as `humidity` (and the deficit, where that is what was measured), the wind from its parts, and
+    nothing below 0 or above saturation."""
+    record = record.copy()
+    if "eastward_wind" in record:
+        record["wind_speed"] = np.hypot(record.pop("eastward_wind"), record.pop("northward_wind"))
+        flags["wind_speed"] = 0
+    saturated = saturation(record["air_temperature"].to_numpy())
+    for name in [name for name in ("humidity", "humidity_beside") if name in record]:
+        values, kind = record[name].to_numpy(), choice.columns["humidity"].kind
+        if kind == "deficit":
+            humidity = 1.0 - np.maximum(values, 0.0) / saturated
+        else:
+            humidity = saturation(values) / saturated if kind == "dew_point" else values
+        limited = np.where(np.isnan(humidity), np.nan, np.clip(humidity, 0.05 if kind == "deficit" else 0.01, 1.0))
+        record[name] = limited
+        if name == "humidity":
+            flags.loc[np.abs(limited - humidity) > 1e-3, name] = LIMITED
+    for name in ("shortwave", "precipitation"):
+        flags.loc[record[name] < -ROUND_OFF[name], name] = LIMITED
+        record[name] = record[name].clip(lower=0.0)
+    return record
+
+
+# ------------------------------------------------------------------------------------------------- years and gaps
+
+
+def _whole_days(table: Table, index: pd.DatetimeIndex, interval: int, years) -> pd.DatetimeIndex:
+    """Times of the whole years that are wanted, or of the whole days of a part of the only one."""
+    edge, step = pd.Timedelta(hours=EDGE_HOURS if interval != DAY else 0), pd.Timedelta(minutes=interval)
+    first, end = index[0], index[-1] + step
+
+    def begins(year):
+        return pd.Timestamp(year, 1, 1)
+
+    whole = [y for y in range(first.year, end.year + 2) if first - edge <= begins(y) and begins(y + 1) <= end + edge]
+    have = f"the record is from {first:%Y-%m-%d} to {index[-1]:%Y-%m-%d}"
+    have += f"; whole years are {whole[0]} to {whole[-1]}" if whole else "; it has no whole year"
+    if years is not None:
+        pair = (years, years) if isinstance(years, (int, np.integer)) else tuple(years) if np.ndim(years) == 1 else ()
+        if len(pair) != 2 or isinstance(years, bool) or not all(isinstance(y, (int, np.integer)) for y in pair):
+            raise ValueError(f"years: a year or (first, last) is allowed, got {years!r}")
+        if pair[0] > pair[1] or pair[0] not in whole or pair[1] not in whole:
+            raise ValueError(f"years = {years!r}: {have}")
+        start, stop = begins(pair[0]), begins(pair[1] + 1)
+    else:
+        start = begins((first + edge).year)
+        if abs(first - start) > edge:
+            say = f"; say years=({whole[0]}, {whole[-1]})" if whole else ""
+            raise ValueError(f"{table.name}: {have}; it has to start on 1 January{say}")
+        days = math.floor((end + edge - start) / pd.Timedelta(days=1))
+        stop = start + pd.Timedelta(days=days)
+        if whole and stop != begins(whole[-1] + 1):
+            raise ValueError(f"{table.name}: {have}, and a part of another; say years=({whole[0]}, {whole[-1]})")
+        if days < 1:
+            raise ValueError(f"{table.name}: {have}; whole days are allowed")
+    return pd.date_range(start, stop - step, freq=f"{interval}min")
+
+
+def _repeat_at_edges(record, flags, row_of, interval: int, report: list[str]) -> None:
+    """Fill what solar time leaves of the first and the last day from the day beside it, in place."""
+    there, per_day = np.flatnonzero(row_of.notna()), DAY // interval
+    if not len(there) or interval == DAY:
+        return
+    before, after = int(there[0]), len(row_of) - 1 - int(there[-1])
+    most = int(EDGE_HOURS * 60 // interval)
+    for places, away in ((range(before), per_day), (range(len(row_of) - after, len(row_of)), -per_day)):
+        if 0 < len(places) <= most and len(row_of) > 2 * per_day:
+            place = np.array(places)
+            record.iloc[place] = record.iloc[place + away].to_numpy()
+            flags.iloc[place] = REPEATED
+            row_of.iloc[place] = row_of.iloc[place + away].to_numpy()
+            report.append(
+                f"{len(place)} intervals at the record's {'start' if away > 0 else 'end'} repeat the day beside them"
+            )
+
+
+def _fill(table, record, flags, row_of, choice: Choice, interval: int, gaps: str, longest_gap_days: float) -> None:
+    """Refuse gaps or fill them, in place; longwave is left to `_add_longwave`."""
+    per_day = DAY // interval
+    kept = ~_leap_day(record.index)  # a record may lack the day that is dropped anyway
+    for quantity in OURS:
+        empty = record[quantity].isna().to_numpy() & kept
+        if not empty.any() or (quantity == "longwave" and "longwave" not in choice.columns):
+            continue
+        if gaps == "refuse":
+            raise ValueError(_first_gap(table, record, row_of, choice, quantity, empty, interval))
+        if f"{quantity}_beside" in record:
+            _put(record, flags, quantity, record[f"{quantity}_beside"], BY_SOURCE)
+        if quantity == "longwave":
+            continue
+        left = record[quantity].isna().to_numpy() & kept
+        first, length = filling.longest(left)
+        if length > longest_gap_days * per_day:
+            raise ValueError(
+                f"{table.name}: {_name(choice, quantity)} is missing from {record.index[first]:%Y-%m-%d %H:%M} on for "
+                f"{length / per_day:.3g} days; gaps of up to longest_gap_days = {longest_gap_days:g} are filled"
+            )
+        if quantity != "precipitation":
+            _put(record, flags, quantity, filling.interpolated(record[quantity], interval), BY_LINE)
+        _put(record, flags, quantity, filling.mean_course(record[quantity], per_day), BY_MEAN)
+        left = record[quantity].isna() & kept
+        if left.any():
+            raise ValueError(
+                f"{table.name}: {_name(choice, quantity)} is missing at {left.idxmax():%Y-%m-%d %H:%M}, and too little "
+                "is known of that time of day in the weeks around; choose other years"
+            )
+
+
+def _moment(time, interval: int) -> str:
+    return f"{time:%Y-%m-%d}" if interval == DAY else f"{time:%Y-%m-%d %H:%M} solar time"
+
+
+def _leap_day(times: pd.DatetimeIndex) -> np.ndarray:
+    return np.asarray((times.month == 2) & (times.day == 29))
+
+
+def _put(record, flags, quantity: str, values, flag: int) -> None:
+    here = record[quantity].isna() & values.notna()
+    record.loc[here, quantity] = values[here]
+    flags.loc[here, quantity] = flag
+
+
+def _first_gap(table, record, row_of, choice, quantity, empty, interval: int) -> str:
+    k = int(np.argmax(empty))
+    time, count = record.index[k], int(empty.sum())
+    asks = f"({count} of {len(empty)} in all); gaps='fill' fills gaps and flags them"
+    row = row_of.iloc[k]
+    if np.isnan(row):
+        known = row_of.iloc[:k].dropna()
+        after = f" after {table.where(int(known.iloc[-1]))}" if len(known) else ""
+        return f"{table.name}: no row for {_moment(time, interval)}{after} {asks}"
+    return f"{table.where(int(row))} ({_moment(time, interval)}): {_name(choice, quantity)} is missing {asks}"
+
+
+def _name(choice: Choice, quantity: str) -> str:
+    column = choice.columns.get(quantity)
+    return column.name if column else "wind"
+
+
+def _add_longwave(record, flags, choice: Choice, latitude_deg: float) -> None:
+    """Compute the longwave that is missing, in place."""
+    lacking = record[record["longwave"].isna() & record["air_temperature"].notna() & record["humidity"].notna()]
+    if lacking.empty:
+        return
+    dates = record.index.normalize()
+    mean = record["shortwave"].groupby(dates).mean()
+    cloud = pd.Series(cloud_cover(pd.DatetimeIndex(mean.index), mean.to_numpy(), latitude_deg), index=mean.index)
+    air = lacking["air_temperature"].to_numpy()
+    vapour = lacking["humidity"].to_numpy() * saturation(air)
+    values = longwave(air, vapour, cloud.reindex(lacking.index.normalize()).to_numpy())
+    _put(record, flags, "longwave", pd.Series(values, index=lacking.index).reindex(record.index), COMPUTED)
+
+
+def _in_half_hours(record, flags, choice: Choice, latitude_deg: float, cycle: DiurnalCycle):
+    """Half-hours of days, and each one's flags, those of its day."""
+    daily = record[list(OURS)].rename(columns=OURS)
+    humidity, saturated = daily.pop("relative_humidity"), saturation(record["air_temperature"].to_numpy())
+    if choice.columns["humidity"].kind == "deficit":
+        daily["vapour_pressure_deficit_hpa"] = (1.0 - humidity) * saturated
+    else:
+        daily["vapour_pressure_hpa"] = humidity * saturated
+    forcing = half_hours(daily, latitude_deg, cycle)
+    each = flags[list(OURS)].reindex(forcing.index.normalize())
+    return forcing, each.set_axis(forcing.index)
+
+
+def _site(record: pd.DataFrame, latitude_deg: float) -> dict[str, float]:
+    """What the record tells of the site: latitude, and of whole years the mean and the first harmonic of the warmth."""
+    site = {"latitude_deg": float(latitude_deg)}
+    days = record["air_temperature"].groupby(record.index.normalize()).mean()
+    if len(days) >= 365:
+        angle = 2.0 * math.pi * (pd.DatetimeIndex(days.index).day_of_year.to_numpy() - 0.5) / 365.25
+        anomaly = days.to_numpy() - days.mean()
+        wave = [2.0 * (anomaly * shape(angle)).mean() for shape in (np.cos, np.sin)]
+        site["mean_annual_temperature_c"] = float(days.mean())
+        site["seasonal_amplitude_c"] = float(math.hypot(*wave))
+    return site
+
+
+def _sources(forcing: pd.DataFrame, choice: Choice) -> list[str]:
+    lines = []
+    for quantity, name in OURS.items():
+        column = choice.columns.get(quantity)
+        of = f"{column.name} [{column.unit}]" if column else "eastward and northward wind"
+        if quantity == "longwave" and column is None:
+            of = "computed (Prata 1996; Crawford and Duchon 1999)"
+        shares = forcing[f"{name}_flag"].value_counts(normalize=True).sort_index()
+        flagged = [f"{100 * share:.2g} % {FLAGS[flag]}" for flag, share in shares.items() if flag != GIVEN]
+        if quantity == "longwave" and column is None:
+            flagged = []
+        lines.append(f"{name}: {of}" + "".join(f"; {each}" for each in flagged))
+    return lines

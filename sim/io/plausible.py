@@ -1,0 +1,69 @@
+"""Whether a record's values can be what they say: the units that limits cannot tell, and the clock."""
+
+import numpy as np
+import pandas as pd
+
+from sim.io.clock import hours_apart, noon_of
+from sim.io.columns import Column
+from sim.io.longwave import extraterrestrial
+
+FEWEST_DAYS = 20  # that tell
+NOON_WITHIN_H = 0.75
+LEAST_SUN_W_M2 = 50.0  # extraterrestrial, of a day whose clearness tells
+WARM_C = 5.0
+
+
+def check_sun(name: str, weather: pd.DataFrame, interval: int, expected_h: float, clock: str) -> None:
+    """Refuse sunlight whose middle is not at noon. expected_h : the hour of the index at which the sun is highest."""
+    days = weather["shortwave"].groupby(weather.index.normalize()).mean()
+    if (days > 20.0).sum() < FEWEST_DAYS:
+        return
+    noon = noon_of(weather.index, interval, weather["shortwave"].to_numpy())
+    if noon is None:
+        return
+    late = hours_apart(noon, expected_h)
+    if abs(late) > NOON_WITHIN_H:
+        when = "after" if late > 0 else "before"
+        raise ValueError(
+            f"{name}: the record has the middle of its light {abs(late):.1f} hours {when} solar noon; {clock}, "
+            "longitude_deg, or starts that are ends of the intervals may be wrong"
+        )
+
+
+def check_units(
+    name: str, weather: pd.DataFrame, columns: dict[str, Column], latitude_deg: float, interval: int
+) -> None:
+    """Refuse values within their limits that must be of another unit; a column whose unit the caller gave passes.
+
+    weather : by local solar time, the record's quantities, relative humidity and precipitation of an interval.
+    """
+    days = weather.groupby(weather.index.normalize()).mean()
+    dates = pd.DatetimeIndex(days.index)
+
+    def refuse(column, what):
+        if not column.unit_given:
+            raise ValueError(
+                f"{name}: {column.name} in {column.unit}: {what}; give its unit, or that one, to go on: "
+                f"units={{{column.name!r}: ..}}"
+            )
+
+    possible = extraterrestrial(dates, latitude_deg)
+    sunny = (possible > LEAST_SUN_W_M2) & days["shortwave"].notna().to_numpy()
+    if sunny.sum() >= FEWEST_DAYS:
+        brightest = float(np.quantile((days["shortwave"].to_numpy() / possible)[sunny], 0.98))
+        if not 0.3 <= brightest <= 1.1:
+            share = f"{100 * brightest:.3g} % of the sunlight above the atmosphere"
+            refuse(columns["shortwave"], f"a clear day has {share}, where 60 to 85 are usual")
+    humidity = columns["humidity"]
+    warm = (days["air_temperature"] > WARM_C) & days["humidity"].notna()
+    if warm.sum() >= FEWEST_DAYS:
+        moments = weather.loc[weather["air_temperature"] > WARM_C, "humidity"].dropna()
+        driest, median = float(moments.quantile(0.02)), float(moments.median())
+        if driest > 0.85:
+            refuse(humidity, f"relative humidity is above {100 * driest:.0f} % in 98 of 100 warm intervals")
+        if median < 0.15:
+            refuse(humidity, f"relative humidity is {100 * median:.2g} % in half of all warm intervals")
+    if len(days) >= 300:
+        yearly = float(weather["precipitation"].mean() * 1440 / interval * 365)
+        if not 20.0 <= yearly <= 5000.0:
+            refuse(columns["precipitation"], f"precipitation is {yearly:.3g} mm a year")

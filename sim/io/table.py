@@ -1,0 +1,115 @@
+"""The rows of a record, from a file or from memory, and how an error names one of them."""
+
+import gzip
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+NO_NUMBER = -9990.0  # -9999 and its likes stand for what is not there
+
+
+@dataclass(frozen=True)
+class Table:
+    """A record as it is given: its columns, and how to read some of them."""
+
+    name: str
+    columns: list[str]
+    read: Callable[[list[str]], pd.DataFrame]
+    first_line: int | None = None
+    """Line of the file that has the first row; None for a table in memory, whose rows count from 0."""
+
+    def where(self, row: int) -> str:
+        """The row, as an error names it."""
+        if self.first_line is None:
+            return f"{self.name}, row {row}"
+        return f"{self.name}, line {self.first_line + row}"
+
+    def numbers(self, texts: pd.Series, name: str) -> np.ndarray:
+        """A column as numbers, NaN where nothing was measured. Raises ValueError for a text, naming its row."""
+        values = pd.to_numeric(texts, errors="coerce").to_numpy(float)
+        text = np.isnan(values) & texts.notna().to_numpy()
+        if text.any():
+            row = int(np.argmax(text))
+            raise ValueError(f"{self.where(row)}: {name} is {texts.iloc[row]!r}; a number is allowed")
+        return np.where(values <= NO_NUMBER, np.nan, values)
+
+
+def open_table(source) -> Table:
+    """A CSV file (also packed as .gz), a NetCDF file, a DataFrame, or an xarray Dataset of one place."""
+    if isinstance(source, pd.DataFrame):
+        return _in_memory(source, "the table")
+    if hasattr(source, "to_dataframe"):
+        return _in_memory(_of_one_place(source, "the dataset"), "the dataset")
+    if not isinstance(source, (str, Path)):
+        raise ValueError(f"forcing: a file, a DataFrame or a Dataset is allowed, got {type(source).__name__}")
+    path = Path(source)
+    if not path.is_file():
+        raise ValueError(f"forcing: there is no file {path}")
+    if path.suffix in (".nc", ".nc4", ".netcdf"):
+        from sim.io.dataset import import_xarray
+
+        with import_xarray("a NetCDF file").open_dataset(path) as dataset:
+            return _in_memory(_of_one_place(dataset, path.name), path.name)
+    if path.suffix in (".zip", ".xlsx", ".xls", ".grib"):
+        raise ValueError(
+            f"forcing: {path.name}: a CSV file (also .gz) or a NetCDF file is allowed; unpack or export it"
+        )
+    return _csv(path)
+
+
+def _csv(path: Path) -> Table:
+    opened = gzip.open(path, "rt", encoding="utf-8-sig") if path.suffix == ".gz" else path.open(encoding="utf-8-sig")
+    with opened as file:
+        comments, header = 0, file.readline()
+        while header.startswith("#"):  # as AmeriFlux begins
+            comments, header = comments + 1, file.readline()
+    if not header.strip():
+        raise ValueError(f"forcing: {path.name}, line {comments + 1}: a row of column names is needed, got nothing")
+    separator = max(",;\t", key=header.count)
+    columns = [name.strip().strip('"') for name in header.rstrip("\r\n").split(separator)]
+    twice = [name for k, name in enumerate(columns) if name in columns[:k]]
+    if twice:
+        raise ValueError(f"forcing: {path.name}, line {comments + 1}: column {twice[0]} is there twice")
+
+    def read(names: list[str]) -> pd.DataFrame:
+        # times stay text; a row of nothing is a row, so that lines can be counted
+        table = pd.read_csv(
+            path,
+            sep=separator,
+            skiprows=comments + 1,
+            header=None,
+            names=columns,
+            usecols=names,
+            index_col=False,
+            skip_blank_lines=False,
+            dtype={name: str for name in names if _is_time(name)},
+            low_memory=False,
+            encoding="utf-8-sig",
+        )
+        empty = table.isna().all(axis=1).to_numpy()
+        return table.iloc[: len(table) - int(np.argmin(empty[::-1])) if len(table) and not empty.all() else 0]
+
+    return Table(path.name, columns, read, first_line=comments + 2)
+
+
+def _is_time(name: str) -> bool:
+    return "time" in name.lower() or "date" in name.lower()
+
+
+def _in_memory(frame: pd.DataFrame, name: str) -> Table:
+    if frame.index.name is not None or isinstance(frame.index, (pd.DatetimeIndex, pd.MultiIndex)):
+        frame = frame.reset_index(names="time" if frame.index.name is None and frame.index.nlevels == 1 else None)
+    frame = frame.reset_index(drop=True)
+    columns = [str(column) for column in frame.columns]
+    return Table(name, columns, lambda names: frame.set_axis(columns, axis=1)[names])
+
+
+def _of_one_place(dataset, name: str) -> pd.DataFrame:
+    wide = {dim: size for dim, size in dataset.sizes.items() if size > 1 and "time" not in str(dim)}
+    if wide:
+        dim, size = next(iter(wide.items()))
+        raise ValueError(f"forcing: {name} has {size} values of {dim}; choose one, such as by .sel or .isel")
+    return dataset.squeeze([dim for dim in dataset.sizes if "time" not in str(dim)], drop=True).to_dataframe()

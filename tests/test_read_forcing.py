@@ -1,0 +1,457 @@
+"""Records of towers and reanalyses as forcing: each format gives the weather it was made of, what is filled is flagged,
+and what cannot be right is refused in a line that names the row and the column."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import records
+from records import ALASKA, SWEDEN
+
+import sim
+from analysis.validation import climate_records, poker_flat, tower_report
+from sim.io.disaggregation import FOREST_CYCLE
+from sim.io.forcing import FLAGS
+from sim.state import FORCING
+
+UTC = {name: SWEDEN[name] for name in ("latitude_deg", "longitude_deg")}
+NAMES = list(FORCING)
+
+
+def flags(forcing, name):
+    return forcing[f"{name}_flag"].to_numpy()
+
+
+@pytest.fixture(scope="module")
+def weather():
+    return records.measured()
+
+
+# ----------------------------------------------------------------------------------------------------- the formats
+
+
+@pytest.mark.parametrize("ending", [".csv", ".csv.gz"])
+def test_fluxnet_gives_the_weather_it_was_made_of(tmp_path, weather, ending):
+    records.fluxnet().to_csv(tmp_path / f"tower{ending}", index=False)
+    forcing = sim.read_forcing(tmp_path / f"tower{ending}", **SWEDEN)
+    assert list(forcing)[:6] == NAMES and forcing.index.equals(weather.index)
+    np.testing.assert_allclose(forcing[NAMES], weather, rtol=0, atol=1e-12)
+    assert flags(forcing, "air_temperature_c").sum() == 48  # those that the source filled
+    assert not forcing[[f"{name}_flag" for name in NAMES[1:]]].any().any()
+    assert forcing.attrs["site"]["latitude_deg"] == SWEDEN["latitude_deg"]
+    assert forcing.attrs["site"]["mean_annual_temperature_c"] == pytest.approx(weather.air_temperature_c.mean())
+    assert "air_temperature_c: TA_F [degC]; 0.27 % filled by its source" in forcing.attrs["report"]
+
+
+def test_icos_gives_the_weather_it_was_made_of(weather):
+    forcing = sim.read_forcing(records.icos(), **SWEDEN)
+    np.testing.assert_allclose(forcing[NAMES], weather, rtol=0, atol=1e-12)
+
+
+def test_ameriflux_has_sensors_at_positions_comments_and_no_longwave(tmp_path, weather):
+    path = tmp_path / "AMF_SE-Svb_BASE_HH_1-5.csv"
+    path.write_text("# Site: SE-Svb\n# Version: 1-5\n" + records.ameriflux().to_csv(index=False))
+    forcing = sim.read_forcing(path, **SWEDEN)
+    np.testing.assert_array_equal(forcing.air_temperature_c, weather.air_temperature_c)  # the highest sensor
+    lit = weather.shortwave_w_m2 > 2.0
+    np.testing.assert_allclose(forcing.shortwave_w_m2[lit], weather.shortwave_w_m2[lit] - 2.0, atol=1e-9)
+    assert (forcing.shortwave_w_m2[~lit] == 0.0).all()
+    assert set(flags(forcing, "shortwave_w_m2")) == {0, 5} and set(flags(forcing, "longwave_w_m2")) == {4}
+    with pytest.raises(ValueError, match=r"BASE_HH_1-5.csv, line 1004 .*TA_1_1_1 is missing \(3 of 17520"):
+        path.write_text("# Site\n# Version\n" + records.with_gaps(records.ameriflux()).to_csv(index=False))
+        sim.read_forcing(path, **SWEDEN)
+
+
+@pytest.mark.parametrize("since_midnight", [True, False])
+def test_era5_land_by_the_hour(weather, since_midnight):
+    forcing = sim.read_forcing(records.era5_land(since_midnight=since_midnight), **UTC)
+    assert len(forcing) == 365 * 24
+    for name in ("shortwave_w_m2", "longwave_w_m2", "wind_speed_m_s", "air_temperature_c"):
+        np.testing.assert_allclose(forcing[name].mean(), weather[name].mean(), rtol=0.002)
+    assert forcing.precipitation_mm.sum() == pytest.approx(weather.precipitation_mm.sum(), rel=1e-3)
+    hour = np.average(forcing.index.hour + 0.5, weights=forcing.shortwave_w_m2)
+    assert hour == pytest.approx(12.0, abs=0.5)
+    corr = np.corrcoef(forcing.shortwave_w_m2[1:-1], weather.shortwave_w_m2.resample("h").mean()[1:-1])[0, 1]
+    assert corr > 0.95
+    humidity = forcing.relative_humidity.resample("D").mean() - weather.relative_humidity.resample("D").mean()
+    assert humidity.abs().max() < 0.05
+
+
+def test_days_are_those_of_the_disaggregator():
+    forcing = sim.read_forcing(records.POKER_FLAT, **ALASKA)
+    daily = poker_flat.daily_weather(poker_flat.record()).assign(precipitation_mm=poker_flat.record()["P_F"])
+    expected = sim.half_hours(daily, ALASKA["latitude_deg"])
+    assert forcing.index.equals(expected.index) and len(forcing) == 4 * 365 * 48
+    np.testing.assert_allclose(forcing[NAMES], expected[NAMES], rtol=1e-9, atol=1e-9)
+    filled = (poker_flat.record()["P_F_QC"] < 1.0).to_numpy()
+    kept = poker_flat.record().index != "2012-02-29"
+    np.testing.assert_array_equal(flags(forcing, "precipitation_mm")[::48] == 1, filled[kept])
+
+
+def test_era5_land_by_the_day():
+    forcing = sim.read_forcing(records.era5_daily(), latitude_deg=64.256)
+    expected = records.measured().resample("D").mean()
+    found = forcing[NAMES].resample("D").mean()
+    for name in ("air_temperature_c", "shortwave_w_m2", "longwave_w_m2", "wind_speed_m_s", "precipitation_mm"):
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-9, atol=1e-9)
+
+
+def test_a_dataset_of_one_place(tmp_path):
+    xarray = pytest.importorskip("xarray")
+    table = records.era5_land(100).set_index("valid_time")
+    dataset = xarray.Dataset.from_dataframe(table).expand_dims(latitude=[64.3], longitude=[19.8])
+    expected = sim.read_forcing(records.era5_land(100), **UTC)
+    pd.testing.assert_frame_equal(sim.read_forcing(dataset, **UTC), expected)
+    dataset.to_netcdf(tmp_path / "era5.nc")
+    pd.testing.assert_frame_equal(sim.read_forcing(tmp_path / "era5.nc", **UTC), expected)
+    twice = xarray.concat([dataset, dataset], "latitude")
+    with pytest.raises(ValueError, match="the dataset has 2 values of latitude; choose one"):
+        sim.read_forcing(twice, **UTC)
+
+
+def test_names_and_units_of_ones_own(weather):
+    table = records.icos().rename(columns={"TA": "Tair", "RH": "rh", "TIMESTAMP_START": "begin"})
+    table = table.drop(columns="TIMESTAMP_END").assign(Tair=table["Tair"] + 273.15)
+    columns = {"air_temperature": "Tair", "humidity": "rh", "time_start": "begin"}
+    forcing = sim.read_forcing(table, columns=columns, units={"Tair": "K", "rh": "%"}, **SWEDEN)
+    np.testing.assert_allclose(forcing[NAMES], weather, rtol=0, atol=1e-9)
+
+
+# ---------------------------------------------------------------------------------------------------- times, years
+
+
+def test_times_with_a_zone_are_converted(weather):
+    table = records.icos()
+    start = pd.to_datetime(table["TIMESTAMP_START"].astype(str)).dt.tz_localize("Etc/GMT-1")
+    for times in (start, start.astype(str), start.dt.tz_convert("America/New_York")):
+        zoned = table.drop(columns="TIMESTAMP_END").assign(TIMESTAMP_START=times)
+        pd.testing.assert_frame_equal(sim.read_forcing(zoned, **UTC)[NAMES], weather, check_freq=False)
+    with pytest.raises(ValueError, match="utc_offset_h: the record's times have a time zone already"):
+        sim.read_forcing(table.assign(TIMESTAMP_START=start), **SWEDEN)
+
+
+def test_what_solar_time_leaves_of_a_day_repeats_the_day_beside_it(weather):
+    east = {**SWEDEN, "longitude_deg": SWEDEN["longitude_deg"] + 90.0, "utc_offset_h": 7.0}
+    table = records.icos()
+    times = pd.to_datetime(table["TIMESTAMP_START"].astype(str)) + pd.Timedelta(minutes=30)
+    table = table.assign(TIMESTAMP_START=times.dt.strftime("%Y%m%d%H%M"))  # the year begins at 00:00 by the clock
+    forcing = sim.read_forcing(table.drop(columns="TIMESTAMP_END"), **east)
+    assert forcing.index[0] == pd.Timestamp("2019-01-01") and len(forcing) == 365 * 48
+    assert flags(forcing, "air_temperature_c").tolist() == [6] + [0] * (365 * 48 - 1)
+    assert forcing.air_temperature_c.iloc[0] == forcing.air_temperature_c.iloc[48]
+
+
+def test_years_are_chosen_and_29_february_is_dropped():
+    forcing = sim.read_forcing(records.POKER_FLAT, years=(2012, 2013), **ALASKA)
+    assert len(forcing) == 2 * 365 * 48 and "29 February was dropped 1 times" in forcing.attrs["report"]
+    assert len(sim.read_forcing(records.POKER_FLAT, years=2012, **ALASKA)) == 365 * 48
+    part = sim.read_forcing(records.icos(90), **SWEDEN)
+    assert len(part) == 90 * 48 and "mean_annual_temperature_c" not in part.attrs["site"]
+
+
+def test_a_record_may_lack_29_february():
+    days = pd.read_csv(records.POKER_FLAT)
+    without = days[days["TIMESTAMP"] != 20120229]
+    pd.testing.assert_frame_equal(sim.read_forcing(without, **ALASKA)[NAMES], sim.read_forcing(days, **ALASKA)[NAMES])
+    with pytest.raises(ValueError, match=r"no row for 2012-02-28 after the table, row 422"):
+        sim.read_forcing(days[days["TIMESTAMP"] != 20120228], **ALASKA)
+
+
+# ------------------------------------------------------------------------------------------------------- filling
+
+
+def test_gaps_are_filled_and_flagged(weather):
+    table = records.with_gaps(records.ameriflux())
+    forcing = sim.read_forcing(table, gaps="fill", **SWEDEN)
+    assert np.flatnonzero(flags(forcing, "air_temperature_c")).tolist() == [1000, 1001, 3000]
+    assert np.flatnonzero(np.isin(flags(forcing, "relative_humidity"), (2, 3))).tolist() == [*range(2000, 2048), 3000]
+    ends = weather.air_temperature_c.iloc[[999, 1002]].to_numpy()
+    np.testing.assert_allclose(forcing.air_temperature_c.iloc[1000:1002], ends[0] + np.diff(ends) * [1 / 3, 2 / 3])
+    days = forcing.relative_humidity.to_numpy().reshape(-1, 48)
+    day, measured = 2000 // 48, np.array(table["RH_1_1_1"] / 100.0)
+    assert days[day + 1, 0] == pytest.approx(
+        np.mean([measured[48 * (day + 1 + k)] for k in range(-7, 8) if k]), rel=0.02
+    )
+    assert forcing[NAMES].notna().all().all() and forcing[NAMES[0]].iloc[4000] == weather[NAMES[0]].iloc[4000]
+
+
+def test_gaps_are_filled_by_the_records_own_reanalysis_first():
+    table = records.fluxnet()
+    table.loc[5000:5100, "TA_F"] = -9999
+    forcing = sim.read_forcing(table, gaps="fill", **SWEDEN)
+    np.testing.assert_allclose(forcing.air_temperature_c.iloc[5000:5101], table["TA_ERA"].iloc[5000:5101])
+    assert (flags(forcing, "air_temperature_c")[5000:5101] == 1).all()
+
+
+def test_every_flag_has_a_meaning():
+    assert list(FLAGS) == list(range(7))
+
+
+@pytest.mark.parametrize("name", ["SE-Svb", "US-Prr", "FI-Sod"])
+def test_computed_longwave_is_near_the_measured(name):
+    """Within what such formulas are good for: 20 W m-2 of bias, 25 by the day (Crawford and Duchon 1999: 8 and 25)."""
+    from sim.io.longwave import cloud_cover, longwave
+
+    climate = climate_records.records()[name]
+    days = climate.days[["air_temperature_c", "vapour_pressure_hpa", "shortwave_w_m2", "longwave_w_m2"]].dropna()
+    cloud = cloud_cover(days.index, days["shortwave_w_m2"].to_numpy(), climate.latitude_deg)
+    found = longwave(days["air_temperature_c"].to_numpy(), days["vapour_pressure_hpa"].to_numpy(), cloud)
+    error = found - days["longwave_w_m2"]
+    assert abs(error.mean()) < 20.0 and (error**2).mean() ** 0.5 < 25.0
+    assert np.corrcoef(found, days["longwave_w_m2"])[0, 1] > 0.9
+
+
+def test_longwave_of_a_gap_is_computed():
+    table = records.icos()
+    table.loc[8000:8100, "LW_IN"] = -9999
+    forcing = sim.read_forcing(table, gaps="fill", **SWEDEN)
+    assert (flags(forcing, "longwave_w_m2") == 4).sum() == 101
+    error = forcing.longwave_w_m2 - records.measured().longwave_w_m2
+    assert (error.drop(error.index[8000:8101]) == 0.0).all() and error.abs().max() < 80.0
+
+
+def test_the_cycle_of_a_day_is_the_one_of_svartberget(weather):
+    found = sim.diurnal_cycle(weather["air_temperature_c"], weather["shortwave_w_m2"])
+    assert found.half_range_per_shortwave == pytest.approx(FOREST_CYCLE.half_range_per_shortwave, rel=5e-3)
+    assert found.peak_hour == pytest.approx(FOREST_CYCLE.peak_hour, abs=0.05)
+    assert tower_report._spring_cycle().half_range_per_shortwave == pytest.approx(0.027, abs=5e-4)
+
+
+# ------------------------------------------------------------------------------------------------------- refusals
+
+
+def tower(change=None, days=200, made=records.fluxnet, **columns):
+    """A record with something wrong."""
+    table = made(days).assign(**columns)
+    return table if change is None else change(table)
+
+
+def with_value(name, value, row=3000, **more):
+    def change(table):
+        table = table.astype({name: object}) if isinstance(value, str) else table
+        table.loc[row, name] = value
+        return table
+
+    return lambda: tower(change, **more)
+
+
+def with_times(change, rows):
+    """The record with the times of some rows changed by a function of them."""
+
+    def changed(table):
+        table = table.drop(columns="TIMESTAMP_END").astype({"TIMESTAMP_START": object})
+        table.loc[rows, "TIMESTAMP_START"] = change(table.loc[rows, "TIMESTAMP_START"])
+        return table
+
+    return lambda: tower(changed)
+
+
+def era5(change, days=200):
+    return lambda: change(records.era5_land(days))
+
+
+KELVIN = 273.15
+BAD = {
+    "a row in kelvin": (
+        with_value("TA_F", 268.4),
+        r"row 3000 \(2019-03-04 11:30\): TA_F is 268.4 degC; \[-75, 50\].*'K'",
+    ),
+    "all in kelvin": (lambda: tower(TA_F=270.0), r"row 0 .*TA_F is 270 degC.*units={'TA_F': 'K'}"),
+    "Celsius for kelvin": (
+        era5(lambda t: t.assign(t2m=t.t2m - KELVIN)),
+        r"row 0 .*t2m is -.* degC; .*say units={'t2m': 'degC'}",
+    ),
+    "VPD in kPa": (
+        lambda: tower(lambda t: t.assign(VPD_F=t.VPD_F / 10)),
+        r"VPD_F in hPa: relative humidity is above \d+ %",
+    ),
+    "VPD in Pa": (
+        lambda: tower(lambda t: t.assign(VPD_F=t.VPD_F * 100)),
+        r"row \d+ .*VPD_F is [\d.]+ hPa; .*say units={'VPD_F': 'Pa'}",
+    ),
+    "pressure in hPa": (lambda: tower(PA_F=973.0), r"PA_F is 9730 hPa; \[500, 1100\] hPa is allowed; if it is in hPa"),
+    "pressure in Pa": (era5(lambda t: t.assign(sp=973.0)), r"sp is 9.73 hPa.*if it is in hPa"),
+    "humidity as a share": (
+        lambda: tower(lambda t: t.assign(RH=t.RH / 100), made=records.icos),
+        r"RH in %: relative humidity is 1 % in half of all warm intervals; .*units={'RH': ..}",
+    ),
+    "humidity of 140 %": (with_value("RH", 140.0, made=records.icos), r"row 3000 .*RH is 1.4; \[0, 1.1\] is allowed"),
+    "negative light": (
+        with_value("SW_IN_F", -50.0),
+        r"row 3000 .*SW_IN_F is -50 W m-2; \[-10, 1500\] W m-2 is allowed",
+    ),
+    "too much light": (with_value("SW_IN_F", 2500.0), r"row 3000 .*SW_IN_F is 2500 W m-2"),
+    "light in kW": (
+        lambda: tower(lambda t: t.assign(SW_IN_F=t.SW_IN_F / 1000)),
+        r"SW_IN_F in W m-2: a clear day has 0\.0\d+ %",
+    ),
+    "light by photons": (
+        lambda: tower(lambda t: t.assign(SW_IN_F=t.SW_IN_F * 1.6)),
+        r"SW_IN_F.*: a clear day has 1\d\d %",
+    ),
+    "net longwave": (lambda: tower(LW_IN_F=-60.0), r"row 0 .*LW_IN_F is -60 W m-2; \[50, 600\]"),
+    "a negative wind": (with_value("WS_F", -1.0), r"row 3000 .*WS_F is -1 m s-1; \[0, 60\]"),
+    "negative rain": (with_value("P_F", -2.0), r"row 3000 .*P_F is -2 mm; \[-0.1, 200\]"),
+    "rain in metres": (
+        lambda: tower(lambda t: t.assign(P_F=t.P_F / 1000), days=365),
+        r"P_F in mm: precipitation is 0.591 mm a year",
+    ),
+    "rain in millimetres": (
+        era5(lambda t: t.assign(tp=t.tp * 1000)),
+        r"row \d+ .*tp is [\d.]+ mm; .*say units={'tp': 'mm'}",
+    ),
+    "text": (with_value("WS_F", "calm"), r"row 3000: WS_F is 'calm'; a number is allowed"),
+    "no temperature": (
+        lambda: tower(lambda t: t.drop(columns=["TA_F", "TA_ERA"])),
+        r"no column for air temperature: none of TA_F, TA_F_MDS, .*columns={'air_temperature': '..'}; the record has T",
+    ),
+    "nothing but -9999": (lambda: tower(made=records.icos, TA=-9999), r"no column for air temperature"),
+    "a gap": (with_value("SW_IN_F", np.nan), r"row 3000 .*SW_IN_F is missing \(1 of 9600 in all\); gaps='fill'"),
+    "a missing row": (
+        lambda: tower(lambda t: t.drop(index=3000)),
+        r"no row for 2019-03-04 12:00 solar time after the table, row 2999 \(1 of 9600",
+    ),
+    "an hour twice, at the end of summer time": (
+        with_times(lambda t: t - np.where(t % 10000 < 100, 7700, 100), range(5000, 5010)),
+        r"row 5000: 2019-04-15 02:30 is there twice, first in the table, row 4998",
+    ),
+    "rows out of order": (
+        lambda: tower(lambda t: pd.concat([t[48:96], t[:48], t[96:]], ignore_index=True)),
+        r"row 48: 2018-12-31 23:30 follows 2019-01-02 23:00; times have to increase",
+    ),
+    "a row off the grid": (
+        with_times(lambda t: t + 7, [3000]),
+        r"row 3000: 2019-03-04 11:37 is not on .*grid of 30 minutes",
+    ),
+    "a time that is none": (
+        with_times(lambda t: ["2019-13-45"], [3000]),
+        r"row 3000: TIMESTAMP_START is '2019-13-45'; a time as",
+    ),
+    "a time that is missing": (
+        with_times(lambda t: [None], [3000]),
+        r"row 3000: TIMESTAMP_START is (None|nan); a time as",
+    ),
+    "times of three hours": (
+        lambda: tower(lambda t: t[::6]),
+        r"a row every 180 minutes; a day, or a divisor of it of at most",
+    ),
+    "months": (lambda: tower(lambda t: t[:: 48 * 31], days=365), r"a row every 31 days"),
+    "a start in June": (
+        lambda: tower(lambda t: t[48 * 151 :], days=365),
+        r"from 2019-06-01 to 2019-12-31; it has no whole year; it has to start on 1 January",
+    ),
+    "one row": (lambda: tower(lambda t: t[:1]), r"1 rows; whole days"),
+    "TIMESTAMP of half-hours": (
+        lambda: tower(lambda t: t.drop(columns="TIMESTAMP_END").rename(columns={"TIMESTAMP_START": "TIMESTAMP"})),
+        r"whether TIMESTAMP is an interval's start or its end is not clear; say columns={'time_start': 'TIMESTAMP'}",
+    ),
+    "no times": (
+        lambda: tower(lambda t: t.drop(columns=["TIMESTAMP_START", "TIMESTAMP_END"])),
+        r"no column of times: none of",
+    ),
+    "sensors that are not told apart": (
+        lambda: tower(lambda t: t.rename(columns={"TA_1_1_1": "TA_2_2_1"}), made=records.ameriflux),
+        r"TA_2_2_1, TA_1_2_1 could be air_temperature; name one: columns={'air_temperature': 'TA_2_2_1'}",
+    ),
+    "sums that fall": (
+        era5(lambda t: t.assign(ssrd=t.ssrd.where(t.index != 3000, 0.0))),
+        r"row 3000 \(2019-05-05 23:00\): ssrd is -[\d.]+ W m-2; \[-10, 1500\] W m-2 is allowed",
+    ),
+    "an array": (lambda: np.zeros((3, 3)), r"a file, a DataFrame or a Dataset is allowed, got ndarray"),
+    "no file": (lambda: "nowhere.csv", r"there is no file nowhere.csv"),
+}
+
+
+@pytest.mark.parametrize(("make", "message"), BAD.values(), ids=BAD)
+def test_a_bad_record_is_refused_in_one_line(make, message):
+    source = make()
+    place = UTC if isinstance(source, pd.DataFrame) and "t2m" in source else SWEDEN
+    with pytest.raises(ValueError, match=message) as refusal:
+        sim.read_forcing(source, **place)
+    assert "\n" not in str(refusal.value)
+
+
+BAD_ARGUMENTS = {
+    "a clock of eight hours off": (
+        {"utc_offset_h": 9.0},
+        r"middle of its light 8.0 hours before solar noon; utc_offset_h = 9",
+    ),
+    "a clock of an hour off": ({"utc_offset_h": 2.0}, r"middle of its light 1.\d hours before solar noon"),
+    "no clock": (
+        {"utc_offset_h": None},
+        r"utc_offset_h is needed: .* without summer time; by the record's sun it is 1",
+    ),
+    "no longitude": ({"longitude_deg": None}, r"longitude_deg is needed"),
+    "longitude of 0 to 360": ({"longitude_deg": 212.5}, r"longitude_deg = 212.5: a number in \[-180, 180\]"),
+    "latitude of the tropics": ({"latitude_deg": 3.0}, r"latitude_deg = 3.0: a number in \[45, 72\]"),
+    "unknown way with gaps": ({"gaps": "ignore"}, r"gaps 'ignore': allowed are refuse, fill"),
+    "gaps of a year": ({"longest_gap_days": 365}, r"longest_gap_days = 365: a number in \[0, 28\]"),
+    "unknown quantity": ({"columns": {"rain": "P_F"}}, r"unknown quantity 'rain'; allowed: air_temperature, humidity"),
+    "unknown column": (
+        {"columns": {"air_temperature": "TA_G"}},
+        r"no column 'TA_G' for air_temperature; did you mean TA_F",
+    ),
+    "columns of another type": ({"columns": ["TA_F"]}, r"columns: a dict of names is allowed, got list"),
+    "unit of no column": ({"units": {"TA": "K"}}, r"units: the record has no column 'TA'"),
+    "unknown unit": ({"units": {"TA_F": "F"}}, r"units: TA_F in 'F'; allowed for air_temperature: degC, K"),
+    "unit of what is not used": ({"units": {"WD": "deg"}}, r"units: WD is not used; used are LW_IN_F"),
+    "column without a unit": (
+        {"columns": {"wind_speed": "WD"}},
+        r"the unit of WD is not known; say units={'WD': ..}: m s-1",
+    ),
+    "years of another record": (
+        {"years": 2020},
+        r"years = 2020: the record is from 2019-01-01 to 2019-07-19; it has no whole",
+    ),
+    "years of text": ({"years": "2019"}, r"years: a year or \(first, last\) is allowed, got '2019'"),
+    "cycle of another type": ({"diurnal_cycle": 3.0}, r"diurnal_cycle: a sim.DiurnalCycle is allowed, got 3.0"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD_ARGUMENTS.values(), ids=BAD_ARGUMENTS)
+def test_a_bad_argument_is_refused_in_one_line(arguments, message):
+    with pytest.raises(ValueError, match=message) as refusal:
+        sim.read_forcing(tower(), **{**SWEDEN, **arguments})
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_unit_that_is_given_is_believed():
+    dry = tower(lambda t: t.assign(VPD_F=t.VPD_F / 10))
+    kilopascal = sim.read_forcing(dry, units={"VPD_F": "kPa"}, **SWEDEN)
+    pd.testing.assert_frame_equal(kilopascal, sim.read_forcing(tower(), **SWEDEN))
+    damp = sim.read_forcing(dry, units={"VPD_F": "hPa"}, **SWEDEN)
+    assert damp.relative_humidity.min() > 0.85
+
+
+def test_a_gap_that_is_too_long_is_refused():
+    table = tower(lambda t: t.drop(index=range(4000, 4960)))
+    message = r"TA_F is missing from 2019-03-25 08:00 on for 20 days; gaps of up to longest_gap_days = 14 are filled"
+    with pytest.raises(ValueError, match=message):
+        sim.read_forcing(table.drop(columns="TA_ERA"), gaps="fill", **SWEDEN)
+
+
+BAD_FILES = {
+    "nothing": ("", r"line 1: a row of column names is needed, got nothing"),
+    "a column twice": ("TIMESTAMP,TA_F,TA_F\n20190101,1,1\n", r"line 1: column TA_F is there twice"),
+    "nothing but names": ("TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n", r"no column for air temperature|0 rows"),
+    "decimal commas": (
+        "TIMESTAMP;TA_F;VPD_F;WS_F;SW_IN_F;P_F\n20190101;1,5;1;1;1;0\n20190102;1,5;1;1;1;0\n",
+        r"line 2: TA_F is '1,5'; a number is allowed",
+    ),
+    "an empty line": (
+        "# tower\nTIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n20190101,1,1,1,10,0\n\n20190102,1,1,1,10,0\n",
+        r"line 4: TIMESTAMP is nan",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), BAD_FILES.values(), ids=BAD_FILES)
+def test_a_bad_file_is_refused_by_its_line(tmp_path, text, message):
+    (tmp_path / "tower.csv").write_text(text)
+    with pytest.raises(ValueError, match=message):
+        sim.read_forcing(tmp_path / "tower.csv", **ALASKA)
+
+
+def test_another_kind_of_file_is_refused(tmp_path):
+    (tmp_path / "tower.zip").write_bytes(b"PK")
+    with pytest.raises(ValueError, match=r"tower.zip: a CSV \(also .gz\) or NetCDF file|unpack or export"):
+        sim.read_forcing(tmp_path / "tower.zip", **ALASKA)
