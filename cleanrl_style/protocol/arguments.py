@@ -11,9 +11,11 @@ import numpy as np
 import tyro
 
 import boreal_env
-from cleanrl_style.protocol.fronts import evaluation_weights
-from cleanrl_style.protocol.sites import FIRST_EVALUATION_SEED, evaluation_seeds
+from cleanrl_style.protocol.fronts import evaluation_weights, return_columns
+from cleanrl_style.protocol.reference import reference_returns
+from cleanrl_style.protocol.sites import FIRST_EVALUATION_SEED, evaluation_seeds, published_seeds
 from cleanrl_style.protocol.task import Task
+from cleanrl_style.protocol.utility import Utility
 
 MAX_ENVS = 1000
 DEFAULT_STEPS = {"generalist": 300_000, "site-specific": 100_000}  # of a training, by the environment's mode
@@ -132,7 +134,32 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
     for package in getattr(args, "track", ()):
         if importlib.util.find_spec(package) is None:
             fail(f"--track {package}: the package is not installed (pip install {package})")
+    if getattr(args, "scalarization", "linear") == "chebyshev":
+        return dataclasses.replace(task, utility=Utility(ideal_point(task, args.ideal_point)))
+    if getattr(args, "ideal_point", None) is not None:
+        fail("--ideal-point is for --scalarization chebyshev")
     return task
+
+
+def ideal_point(task: Task, given=None) -> tuple[float, ...]:
+    """The point that Chebyshev's utility measures from, a return for each objective.
+
+    In each objective it is the return of the constant plan which is best in it, mean of the task's test episodes: fixed
+    by the task, whatever is learned. given : by the user instead.
+    """
+    names = ", ".join(task.objectives)
+    if given is None and not task.boreal:
+        fail(f"--ideal-point: a return for each of {names} is needed, as --env-id {task.env_id} has no constant plans")
+    if given is None:
+        episodes = len(published_seeds("test")) if task.draws_sites else 1
+        plans = reference_returns(task, evaluation_seeds(task, episodes))
+        plans = plans[plans.plan.str.isdigit()]
+        given = plans.groupby("plan")[return_columns(task.objectives)].mean().max().round(2)
+        shown = (f"{name} {value:g}" for name, value in zip(task.objectives, given, strict=True))
+        print(f"Chebyshev's ideal point: {', '.join(shown)}")
+    if len(given) != task.num_objectives or not np.isfinite(given).all():
+        fail(f"--ideal-point: {task.num_objectives} finite numbers, of {names}, are allowed, not {list(given)}")
+    return tuple(float(value) for value in given)
 
 
 def name_environment(args) -> str:
