@@ -367,11 +367,12 @@ if __name__ == "__main__":
                 next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
                 env_seconds += time.perf_counter() - env_start
                 next_done = terminations | truncations
+                episode_returns += reward
                 scaled = reward * args.reward_scales
                 if not args.per_objective_advantages:
-                    # what the year is worth to who has the returns so far: a year's reward, if utility is linear
-                    scaled = task.utility.gain(episode_returns * args.reward_scales, scaled, preferences)[:, None]
-                episode_returns += reward
+                    # what the year adds to the utility of the returns; if that is linear, its rewards' weighted sum
+                    before = (episode_returns - reward) * args.reward_scales
+                    scaled = task.utility.gain(before, scaled, preferences)[:, None]
                 rewards[step] = torch.from_numpy(scaled)
                 weights[step] = torch.from_numpy(preferences)
 

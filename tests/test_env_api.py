@@ -122,7 +122,7 @@ def test_a_spawned_worker_needs_nothing_but_the_id():
 
 
 def test_instances_do_not_disturb_each_other():
-    one, other = quick(), quick(mode="site_specific")
+    one, other = quick(), quick(mode="site-specific")
     one.reset(seed=1), other.reset(seed=9)
     rewards = [(one.step(action)[1], other.step(24 - action)[1])[0] for action in (24, 0, 17, 3)]
     np.testing.assert_array_equal(rewards, play(quick(), [24, 0, 17, 3], seed=1)[1])
@@ -177,7 +177,7 @@ def test_memory_is_bounded_over_any_number_of_episodes():
 def test_an_environment_says_what_it_is():
     env = gym.make("boreal-site-specific-v0", site_seed=5, thaw_formulation="contrast", objectives=THREE, years=7)
     for one in (env.unwrapped, env.unwrapped.lockstep(2)):
-        assert (one.mode, one.years, one.site_seed, one.thaw_formulation) == ("site_specific", 7, 5, "contrast")
+        assert (one.mode, one.years, one.site_seed, one.thaw_formulation) == ("site-specific", 7, 5, "contrast")
         assert (one.objective_names, one.reward_dim) == (("carbon", "thaw", "timber"), 3)
         assert one.observation_names[:3] == ("preference_carbon", "preference_thaw", "year")
 

@@ -306,12 +306,14 @@ class Run:
             )
 
     def save_policy(self, agent, **arguments) -> None:
-        """Write policy.pt, weights alone: what `load_agent` makes the agent of. arguments : the Agent's own."""
+        """Write policy.pt, what `load_policy` makes the policy of: no code in it. arguments : the Agent's own."""
         import torch
 
         buffer = io.BytesIO()
         shape = self.envs.single_observation_space.shape
-        torch.save({"agent": agent.state_dict(), "arguments": arguments, "observation_shape": shape}, buffer)
+        run = json.loads(json.dumps({name: self.config[name] for name in ("script", "arguments")}))
+        policy = {"agent": agent.state_dict(), "arguments": arguments, "observation_shape": shape, "run": run}
+        torch.save(policy, buffer)
         with self._writing(), replacing(self.folder / "policy.pt") as file:
             file.write(buffer.getvalue())
 

@@ -63,7 +63,7 @@ class Task:
             task = replace(
                 task,
                 boreal=True,
-                mode=one.mode.replace("_", "-"),
+                mode=one.mode,
                 thaw_formulation=one.thaw_formulation,
                 years=one.years,
                 draws_sites=draws_sites,
