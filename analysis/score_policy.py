@@ -18,17 +18,12 @@ import tyro
 
 from analysis.excerpts import markdown
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference, score
+from cleanrl_style.protocol import fronts, reference, score
 from cleanrl_style.protocol.summary import followed
 
 TASKS = ("boreal-generalist-v0", "boreal-balanced-v0")
-COLUMNS = (
-    "name",
-    "script",
-    "trained on",
-    "steps",
-    *(f"{policy}, {task}" for task in TASKS for policy in protocol.POLICIES),
-)
+SCORES = tuple(f"{policy}, {task}" for task in TASKS for policy in protocol.POLICIES)
+COLUMNS = ("name", "script", "trained on", "steps", *SCORES)
 PAGE, TABLE = Path("docs", "leaderboard.md"), Path("docs", "leaderboard.csv")
 SECTION = re.compile(r"(<!-- leaderboard -->\n).*?(<!-- end of leaderboard -->)", re.DOTALL)
 CHECKED = 8  # episodes a weight that are played again
@@ -60,19 +55,14 @@ def check(policy: protocol.Policy, folder: Path) -> str:
         return "a policy file alone: nothing to check it against"
     written = pd.read_csv(folder / "evaluation.csv")
     written = written[written.episode < CHECKED].reset_index(drop=True)
-    weights = np.unique(score.weights_of(written), axis=0)
-    episodes = int(written.episode.max()) + 1
-    again, _ = protocol.evaluate(policy.task(), policy.probabilities, weights, episodes)
-    key = ["policy", *(name for name in written if name == "preference" or name.startswith("weight_")), "seed"]
-    both = [table.sort_values(key)[[*key, *returns]] for table in (written, again) for returns in [returns_of(table)]]
-    if not np.allclose(both[0][returns_of(written)], both[1][returns_of(again)], atol=1e-4):
+    weights = np.unique(fronts.weights_of(written), axis=0)
+    again, _ = protocol.evaluate(policy.task(), policy.probabilities, weights, int(written.episode.max()) + 1)
+    objectives = fronts.objectives_of(written.columns)
+    key = ["policy", *fronts.weight_columns(objectives), "seed"]
+    first, second = (table.sort_values(key)[fronts.return_columns(objectives)] for table in (written, again))
+    if first.shape != second.shape or not np.allclose(first, second, atol=1e-4):
         raise ValueError(f"{folder}: its policy does not play what evaluation.csv says (of another physics?)")
     return f"plays its evaluation again, {len(again)} episodes"
-
-
-def returns_of(table: pd.DataFrame) -> list[str]:
-    """Columns of the returns."""
-    return [name for name in table if name.endswith("_return") and name != "scalarized_return"]
 
 
 def comparison(policy: protocol.Policy, env_id: str, episodes: int) -> score.Comparison:
@@ -83,7 +73,7 @@ def comparison(policy: protocol.Policy, env_id: str, episodes: int) -> score.Com
     size = task.make().observation_space.shape[0]
     if size != policy.size:
         raise ValueError(f"{policy.name} observes {policy.size} entries, {env_id} has {size}: --tasks names others")
-    weights = protocol.evaluation_weights(task.num_objectives)
+    weights = fronts.evaluation_weights(task.num_objectives)
     evaluation, _ = protocol.evaluate(task, policy.probabilities, weights, episodes)
     plans = reference.reference_returns(task, evaluation.seed.drop_duplicates().tolist())
     return score.Comparison(evaluation, plans)
