@@ -192,3 +192,27 @@ def test_lockstep_has_the_same_arguments_but_for_the_changes():
             assert_same(a, b)
     with pytest.raises(ValueError, match="unknown argument 'carbon_price'"):
         env.lockstep(4, carbon_price=3)
+
+
+@pytest.mark.parametrize("years", [50, 3])
+def test_its_spec_says_how_long_an_episode_is(years):
+    env, envs = (make("boreal-generalist-v0", years=years) for make in (gym.make, gym.make_vec))
+    assert env.spec.max_episode_steps == env.unwrapped.spec.max_episode_steps == envs.spec.max_episode_steps == years
+    assert BorealEnv().spec is None and gym.spec("boreal-generalist-v0").max_episode_steps is None
+    env = gym.make("boreal-generalist-v0", **{**QUICK, "years": 2})  # in no TimeLimit: its end is its own
+    env.reset(seed=1)
+    assert [env.step(12)[2:4] for _ in range(2)] == [(False, False), (True, False)]
+
+
+def test_every_step_has_its_record_if_asked():
+    env, envs = quick(record_steps=True, record_years=True), quick_vector(2, record_steps=True)
+    env.reset(seed=3), envs.reset(seed=[3, 4])
+    terminated, densities = False, []
+    while not terminated:
+        *_, terminated, _, info = env.step(22)
+        *_, together = envs.step(np.array([22, 22]))
+        assert tuple(info["record"]) == boreal_env.HISTORY_NAMES
+        assert info["record"] == {name: together["record"][name][0] for name in boreal_env.HISTORY_NAMES}
+        densities.append(info["record"]["density_stems_ha"])
+    np.testing.assert_array_equal(densities, info["years"]["density_stems_ha"])
+    assert together["_record"].all() and together["record"]["_density_stems_ha"].all()
