@@ -1,5 +1,5 @@
-"""Measures what ships with the code: returns of the constant plans and fixed strategies on the published test sites, and
-of the constant plans on the validation sites that a training's course is measured on.
+"""Measures what ships with the code: returns of the constant plans and fixed strategies on the published test sites,
+and of the constant plans on the validation sites that a training's course is measured on.
 
     python analysis/reference_returns.py      # four minutes on two idle cores
 
