@@ -86,7 +86,9 @@ def print_score(objectives, comparison: Comparison) -> None:
 
 
 def print_course(course: Course, table: pd.DataFrame) -> None:
-    """The score in the course of the training; table : validation.csv."""
+    """The score in the course of the training; table : validation.csv, empty of a script that does not play it."""
+    if table.empty:
+        return
     scores = [f"{course.score(rows):.0f}" for _, rows in table.groupby("global_step")]
     shares = [f"{100 * step / course.steps:.0f}" for step in table.global_step.unique()]
     print(
