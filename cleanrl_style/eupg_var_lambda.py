@@ -149,6 +149,8 @@ def eupg_loss(agent, x, mask, action, utility):
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
+    if args.scalarization == "chebyshev" and args.utility == "future":
+        protocol.fail("--utility future is for --scalarization linear: Chebyshev's is the utility of a whole return")
     task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns
     update_columns = (
@@ -160,8 +162,6 @@ if __name__ == "__main__":
         "utility_mean",
         "utility_std",
     )
-    if args.scalarization == "chebyshev" and args.utility == "future":
-        protocol.fail("--utility future is for --scalarization linear: Chebyshev's is the utility of a whole return")
     if args.baseline == "others" and args.num_envs == 1:
         protocol.fail("--baseline others is the mean of a batch's other episodes: --num-envs 1 has none")
     if task.years and args.total_timesteps < task.years * args.num_envs:

@@ -266,9 +266,9 @@ class Curriculum:
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
-    task = protocol.make_task(args, hide_site=args.hide_site)
     if args.scalarization == "chebyshev" and args.per_objective_advantages:
         protocol.fail("--per-objective-advantages is for --scalarization linear: it weighs each advantage by itself")
+    task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns
     update_columns = (
         "iteration",

@@ -226,9 +226,9 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
-    task = protocol.make_task(args, hide_site=args.hide_site)
     if args.scalarization == "chebyshev":
         protocol.fail("--scalarization chebyshev: each objective has an advantage of its own here; linear is allowed")
+    task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns
     if args.group_size < 1 or args.num_envs % args.group_size:
         protocol.fail(f"--group-size {args.group_size}: a divisor of --num-envs {args.num_envs} is allowed")

@@ -18,6 +18,7 @@ from cleanrl_style.protocol.task import Task
 from cleanrl_style.protocol.utility import Utility
 
 MAX_ENVS = 1000
+ONE_SITE_EPISODES = 32  # that an ideal point is taken from, where a task has one site under many weathers
 DEFAULT_STEPS = {"generalist": 300_000, "site-specific": 100_000}  # of a training, by the environment's mode
 # Arguments that change nothing in what a run computes.
 FREE_ARGUMENTS = ("run_dir", "overwrite", "track", "wandb_project_name")
@@ -145,14 +146,15 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
 def ideal_point(task: Task, given=None) -> tuple[float, ...]:
     """The point that Chebyshev's utility measures from, a return for each objective.
 
-    In each objective it is the return of the constant plan which is best in it, mean of the task's test episodes: fixed
-    by the task, whatever is learned. given : by the user instead.
+    In each objective it is the return of the constant plan which is best in it, mean of the task's test episodes (of one
+    site, of ONE_SITE_EPISODES weathers): fixed by the task, whatever is learned. given : by the user instead.
     """
     names = ", ".join(task.objectives)
     if given is None and not task.boreal:
         fail(f"--ideal-point: a return for each of {names} is needed, as --env-id {task.env_id} has no constant plans")
     if given is None:
-        episodes = len(published_seeds("test")) if task.draws_sites else 1
+        weathers = 1 if task.mode == "site-specific" else ONE_SITE_EPISODES
+        episodes = len(published_seeds("test")) if task.draws_sites else weathers
         plans = reference_returns(task, evaluation_seeds(task, episodes))
         plans = plans[plans.plan.str.isdigit()]
         given = plans.groupby("plan")[return_columns(task.objectives)].mean().max().round(2)
