@@ -146,8 +146,8 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
 def ideal_point(task: Task, given=None) -> tuple[float, ...]:
     """The point that Chebyshev's utility measures from, a return for each objective.
 
-    In each objective it is the return of the constant plan which is best in it, mean of the task's test episodes (of one
-    site, of ONE_SITE_EPISODES weathers): fixed by the task, whatever is learned. given : by the user instead.
+    In each objective it is the return of the constant plan which is best in it, mean of the task's test episodes (on
+    one site, of ONE_SITE_EPISODES weathers): fixed by the task, whatever is learned. given : by the user instead.
     """
     names = ", ".join(task.objectives)
     if given is None and not task.boreal:
