@@ -129,6 +129,9 @@ def draw_summary(
     played = pd.DataFrame() if course is None else pd.read_csv(folder / "validation.csv")
     draws = [_draw_gains] if comparison is not None else []
     draws += [_draw_trade_off if len(objectives) == 2 else _draw_parallel] if learns else [_draw_episodes]
+    points = evaluation
+    if learns and comparison is not None:  # what these two draw are gains then
+        points = pd.concat([comparison.gains[name].assign(policy=name) for name in (*POLICIES, "best")])
     used = (len(objectives) + 1 if learns else 3) + len(draws)
     rows = math.ceil(used / 2)
     figure = Figure(figsize=(10, 3.5 * rows), layout="constrained")
@@ -146,7 +149,7 @@ def draw_summary(
     else:
         _draw_years(axes, of_last_weights(years, objectives))
     for ax, draw in zip(axes[used - len(draws) :], draws, strict=False):
-        draw(figure, ax, objectives, evaluation if draw is not _draw_gains else comparison)
+        draw(figure, ax, objectives, points if draw is not _draw_gains else comparison)
     for ax in axes[used:]:
         ax.set_axis_off()
     figure.savefig(file, format="png", dpi=120)
@@ -237,8 +240,13 @@ def _draw_years(axes, years: pd.DataFrame) -> None:
         ax.legend(fontsize=8)
 
 
+def what_is_shown(table: pd.DataFrame) -> str:
+    """Returns, or gains if the table has the best constant plans' too."""
+    return "gain" if (table.policy == "best").any() else "return"
+
+
 def _draw_trade_off(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
-    first, second = objectives
+    (first, second), what = objectives, what_is_shown(evaluation)
     returns = fronts.return_columns((second, first))
     for policy, marker in (("sampled", "o"), ("greedy", "^")):
         means = evaluation[evaluation.policy == policy].groupby("preference")[returns].mean()
@@ -255,7 +263,11 @@ def _draw_trade_off(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
         ax.plot([], [], marker, color="white", markeredgecolor="black", label=f"{policy} policy")
         for weight in (means.index[0], means.index[-1]):
             ax.annotate(f"{weight:g}", means.loc[weight], xytext=(5, 5), textcoords="offset points", fontsize=8)
-    ax.set(xlabel=f"mean {second} return", ylabel=f"mean {first} return", title="evaluation, one point per weight")
+    if what == "gain":
+        best = evaluation[evaluation.policy == "best"].groupby("preference")[returns].mean()
+        ax.plot(best[returns[0]], best[returns[1]], "kx:", markersize=5, linewidth=0.8, label="best constant plans")
+        ax.plot(0, 0, "k+", markersize=9, label="doing nothing")
+    ax.set(xlabel=f"mean {second} {what}", ylabel=f"mean {first} {what}", title="evaluation, one point per weight")
     ax.locator_params(nbins=6)
     ax.ticklabel_format(useOffset=False)
     ax.legend(fontsize=8)
@@ -272,7 +284,7 @@ def _draw_parallel(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
     for k, name in enumerate(objectives):
         ax.plot([], [], "o-", color=COLOURS[k % len(COLOURS)], label=f"{name} weighs most")
     ax.set_xticks(range(len(objectives)), objectives)
-    ax.set(ylabel="mean return", title=f"evaluation, {PRIMARY} policy, one line per weight")
+    ax.set(ylabel=f"mean {what_is_shown(evaluation)}", title=f"evaluation, {PRIMARY} policy, one line per weight")
     ax.legend(fontsize=8)
 
 
