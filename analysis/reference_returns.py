@@ -54,7 +54,7 @@ def measure(task: protocol.Task, test: list[int], validation: list[int]) -> pd.D
 def main(args: Args) -> None:
     """Measure what is missing or of another physics."""
     test = list(sites.published_seeds("test"))[: args.episodes]
-    validation = list(sites.published_seeds("validation"))[: course.SITES]  # of a training's course
+    validation = list(sites.published_seeds("validation"))[: course.STANDS]  # of a training's course
     for env_id in ENVIRONMENTS:
         task, path = protocol.Task.of(env_id), args.folder / f"{env_id}.csv.gz"
         physics = reference.fingerprint(task)

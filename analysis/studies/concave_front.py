@@ -1,8 +1,8 @@
 """A front that a weighted sum misses: a site's constant plans, and which of them each utility ever takes.
 
-    python analysis/studies/concave_front.py      # half a minute on two cores
+    python analysis/studies/concave_front.py      # seconds
 
-Every constant plan is played on one site of the published ones, under 32 weathers. Of those that no other plan
+Every constant plan is played on one of the published sites, under its fixed weather. Of those that no other plan
 dominates some lie below the line between two others: at no preference a weighted sum takes them, Chebyshev's utility
 does. Writes results/studies/concave_front.csv (mean gains over doing nothing, and at how many of 101 preferences a plan
 is the best one) and docs/images/concave_front.png.
@@ -18,10 +18,10 @@ from matplotlib.figure import Figure
 from analysis import paths
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts, reference
-from cleanrl_style.protocol.arguments import ONE_SITE_EPISODES, ideal_point
+from cleanrl_style.protocol.arguments import ideal_point
 from cleanrl_style.protocol.utility import LINEAR, Utility
 
-SITE = 550347390
+SITE = 1037049714
 WEIGHTS = np.linspace(0, 1, 101)
 
 
@@ -29,7 +29,7 @@ WEIGHTS = np.linspace(0, 1, 101)
 class Args:
     """Finds which constant plans each utility takes on one site."""
 
-    env_id: str = "boreal-generalist-v0"
+    env_id: str = "boreal-site-specific-v0"
     """environment"""
     site_seed: int = SITE
     """site, as sim.sample_site draws it"""
@@ -91,7 +91,7 @@ NAMES = {"linear": "weighted sum", "chebyshev": "Chebyshev's utility"}
 def main(args: Args) -> None:
     """Play, or take what was played before; write the table and the picture."""
     task = protocol.Task.of(args.env_id, site_seed=args.site_seed)
-    front, choices = study(task, protocol.evaluation_seeds(task, ONE_SITE_EPISODES))
+    front, choices = study(task, protocol.evaluation_seeds(task, 1))
     print(front.to_string(index=False, float_format="%.3f"))
     path = paths.studies() / "concave_front.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -99,7 +99,7 @@ def main(args: Args) -> None:
         front.to_csv(file, index=False, float_format="%.6g", lineterminator="\n")
     args.path.parent.mkdir(parents=True, exist_ok=True)
     with protocol.replacing(args.path) as file:
-        title = f"{args.env_id}, site {args.site_seed}: constant plans under {ONE_SITE_EPISODES} weathers"
+        title = f"{args.env_id}, site {args.site_seed}: constant plans"
         draw(front, choices, title).savefig(file, format="png", dpi=110)
     print(f"wrote {path} and {args.path}")
 

@@ -19,7 +19,7 @@ from cleanrl_style.protocol.sites import evaluation_seeds
 from cleanrl_style.protocol.task import Task
 
 SHARES = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the training's steps, and at its end: all in all 2 % of a run's time, or less
-SITES = 10  # at three weights they fill two blocks
+STANDS = 30  # that are played: of two objectives 10 sites at 3 weights. They fill two blocks of the evaluation's kernel
 
 
 def gain_columns(objectives) -> list[str]:
@@ -33,11 +33,12 @@ class Course:
     def __init__(self, task: Task, steps: int, episodes: int, done: int):
         """steps: of the training; episodes: at most so many sites; done: steps of an earlier process."""
         self.task, self.steps, self.done = task, steps, done
-        one = task.mode == "site-specific"  # where all greedy episodes of a weight are the same
-        self.seeds = evaluation_seeds(task, 1 if one else min(SITES, episodes), "validation")
         number = task.num_objectives
         spread = np.vstack([np.eye(number), np.full(number, 1 / number)])
         self.weights = np.unique(spread if task.preference is None else task.preference[None], axis=0)
+        one = task.mode == "site-specific"  # where all greedy episodes of a weight are the same
+        sites = 1 if one else min(STANDS // len(self.weights), episodes)
+        self.seeds = evaluation_seeds(task, sites, "validation")
         self.columns = ("global_step", *weight_columns(task.objectives), *gain_columns(task.objectives))
 
     @property
