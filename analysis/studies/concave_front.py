@@ -73,7 +73,9 @@ def draw(front: pd.DataFrame, choices: dict[str, np.ndarray], title: str) -> Fig
         supported.carbon_gain, supported.thaw_gain, "ks", fillstyle="none", markersize=11, label="weighted sum takes it"
     )
     for row in front.itertuples():
-        left.annotate(reference.title(row.plan), (row.carbon_gain, row.thaw_gain), xytext=(6, 4), **SMALL)
+        left.annotate(
+            reference.title(row.plan).rpartition(", ")[2], (row.carbon_gain, row.thaw_gain), xytext=(6, 4), **SMALL
+        )
     left.set(xlabel="carbon gain", ylabel="thaw gain", title="plans that no other dominates")
     left.margins(x=0.35, y=0.15)
     left.legend(fontsize=7, loc="lower left")
