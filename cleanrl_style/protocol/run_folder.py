@@ -311,7 +311,8 @@ class Run:
 
         buffer = io.BytesIO()
         shape = self.envs.single_observation_space.shape
-        run = json.loads(json.dumps({name: self.config[name] for name in ("script", "arguments")}))
+        own = {name: value for name, value in self.config["arguments"].items() if name != "vectorization"}
+        run = json.loads(json.dumps({"script": self.script, "arguments": own}))  # the same bytes, async or lockstep
         policy = {"agent": agent.state_dict(), "arguments": arguments, "observation_shape": shape, "run": run}
         torch.save(policy, buffer)
         with self._writing(), replacing(self.folder / "policy.pt") as file:
