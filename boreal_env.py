@@ -2,11 +2,14 @@
 
 `import boreal_env` registers the ids of `REGISTERED`, at the end. Here are the environment of one stand, with its
 manual, and that of many in lockstep. What they are made of is in `sim/task/`: what is observed, which actions are
-valid, what is rewarded, the preference, and the episodes that both share.
+valid, what is rewarded, the preference, and the episodes that both share. `python -m boreal_env` says what there is.
 """
+
+import runpy
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Discrete
 from gymnasium.utils import EzPickle
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -102,6 +105,8 @@ def warm_up(num_envs: int = 1, threads: int | None = None) -> None:
 class Described:
     """What both environments say of themselves."""
 
+    _spec: EnvSpec | None = None
+
     def _describe(self, number: int, arguments: dict, threads: int | None = None) -> None:
         self._arguments = check_arguments(arguments)
         self._episodes = Episodes(number, threads=threads, **arguments)
@@ -113,6 +118,17 @@ class Described:
         self.objective_names: tuple[str, ...] = self._episodes.objective_names
         self.reward_space: Box = self._episodes.reward_space
         self.reward_dim = len(self.objective_names)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What gymnasium.make made it of; max_episode_steps is its years, with no TimeLimit: an episode ends itself."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec
+        if spec is not None:
+            spec.max_episode_steps = self.years
 
     def mask_function(self) -> MaskFunction | None:
         """Observations (n, entries) -> valid actions, bool (n, 25); None where they lack the density or the ages."""
@@ -177,7 +193,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     After 50 years the episode is terminated: nothing is worth anything beyond.
 
     ## Arguments
-    - `mode`: "generalist" or "site_specific"
+    - `mode`: "generalist" or "site-specific"
     - `years`: length of an episode (50)
     - `time_step_minutes`: a divisor of 1440, at most 120 (30)
     - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (on a GPU, for thousands of stands)
@@ -213,12 +229,13 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `constants`: literature constants to override, see `sim/constants.csv`
     - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`, whose order they keep
     - `record_years`: put the annual record into the last step's info, as `info["years"]`
+    - `record_steps`: put the year's record into every step's info, as `info["record"]`, a number a column
     - `render_mode`: "rgb_array" or None
 
     ## Reset and Step
     `reset(seed=, options={"preference": w, "site": {name: value}})`; seeds are at most 2^63 - 1, here and everywhere.
-    `info` is empty but for the last step, where it has the episode's totals. Bad values raise ValueError, a step before
-    reset or after the end RuntimeError.
+    `info` is empty but for the last step, where it has the episode's totals (and for `record_steps`). Bad values raise
+    ValueError, a step before reset or after the end RuntimeError.
 
     ## What It Can Be Asked
     `objective_names`, `reward_dim`, `mode`, `years`, `thaw_formulation`, `site_seed` and `observation_names` are
@@ -264,6 +281,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
         reward = self._episodes.advance(values.reshape(1))[0]
         terminated = not bool(self._episodes.running[0])
         info = self._episodes.final_info(0) if terminated else {}
+        if self._episodes.record_steps:
+            info["record"] = {name: float(column[0]) for name, column in self._episodes.year_record().items()}
         return self._episodes.observations()[0], reward, terminated, False, info
 
     def action_masks(self) -> np.ndarray:
@@ -366,6 +385,10 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
         rewards = self._episodes.advance(actions)
         ended = ~self._episodes.running
         infos: dict = {}
+        if self._episodes.record_steps:
+            all_of_them = np.ones(self.num_envs, bool)
+            record = self._episodes.year_record()
+            infos = {"record": {**record, **{f"_{name}": all_of_them for name in record}}, "_record": all_of_them}
         observations = self._episodes.observations()
         if ended.any():
             indices = np.flatnonzero(ended)
@@ -380,6 +403,19 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
     def action_masks(self) -> np.ndarray:
         """Actions that can be carried out in full, bool, shape (num_envs, 25)."""
         return self._episodes.action_masks()
+
+    def weights(self) -> np.ndarray:
+        """The preference of every episode that is under way, as weights (num_envs, m)."""
+        return self._episodes.weights.copy()
+
+    def stable_baselines3(self):
+        """These stands as a VecEnv of Stable-Baselines3, with masks for sb3-contrib: `pip install "borearl[sb3]"`.
+
+        Each stand's reward is scalarised by its own preference, which it observes.
+        """
+        from sim.task.stable_baselines import LockstepVecEnv
+
+        return LockstepVecEnv(self)
 
     def call(self, name: str, *args, **kwargs) -> tuple:
         """A method of every environment, as with gymnasium's AsyncVectorEnv: here `action_masks` only."""
@@ -434,7 +470,7 @@ def _spread(name, value, number) -> list:
 # ---------------------------------------------------------------------------------------------------------------
 REGISTERED: dict[str, dict] = {
     "boreal-generalist-v0": {"mode": "generalist"},
-    "boreal-site-specific-v0": {"mode": "site_specific"},
+    "boreal-site-specific-v0": {"mode": "site-specific"},
     "boreal-balanced-v0": {"mode": "generalist", "balanced": True, **BALANCED_WORLD},
     "boreal-timber-v0": {
         "mode": "generalist",
@@ -452,11 +488,14 @@ REGISTERED: dict[str, dict] = {
     },
     "boreal-warming-v0": {"mode": "generalist", "balanced": True, **BALANCED_WORLD, "scenario": "ssp245"},
 }
-for _name, _kwargs in REGISTERED.items():
-    gym.register(
-        id=_name,
-        entry_point="boreal_env:BorealEnv",
-        vector_entry_point="boreal_env:BorealVectorEnv",
-        disable_env_checker=True,  # it warns at every vector reward
-        kwargs=_kwargs,
-    )
+if __name__ == "__main__":  # python -m boreal_env
+    runpy.run_module("cleanrl_style.protocol.command_line", run_name="__main__")
+else:
+    for _name, _kwargs in REGISTERED.items():
+        gym.register(
+            id=_name,
+            entry_point="boreal_env:BorealEnv",
+            vector_entry_point="boreal_env:BorealVectorEnv",
+            disable_env_checker=True,  # it warns at every vector reward
+            kwargs=_kwargs,
+        )

@@ -6,8 +6,6 @@ The stand is planted for twelve years and then left alone. The animation is of c
 policy of a run, which plays the same site and weather.
 """
 
-import json
-from collections.abc import Callable
 from pathlib import Path
 
 import gymnasium as gym
@@ -19,15 +17,10 @@ import boreal_env
 from analysis.experiments import GENERALIST
 from baselines_heuristic import conifer_restoration
 from cleanrl_style import protocol
-from cleanrl_style.protocol.evaluation import choose_actions
+from cleanrl_style.protocol import command_line
 
 SEED, YEARS, PLANTING_YEARS = 11, 35, 12
 PLANT_100_HALF_CONIFER = 22
-FRAME_MS, LAST_FRAME_MS = 200, 3000
-FRAME_SIZE = (640, 400)  # pixels
-
-#: Actions (n,) of observations (n, d), masks (n, 25) and accrued returns (n, 2).
-Policy = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 def stand() -> Image.Image:
@@ -37,45 +30,6 @@ def stand() -> Image.Image:
     for year in range(YEARS):
         env.step(PLANT_100_HALF_CONIFER if year < PLANTING_YEARS else boreal_env.NO_CHANGE)
     return Image.fromarray(env.render())
-
-
-def frames(policy: Policy, env_id: str, preference: float) -> list[Image.Image]:
-    """An episode of a policy, a frame a year."""
-    env = gym.make(env_id, render_mode="rgb_array")
-    observation, _ = env.reset(seed=SEED, options={"preference": preference})
-    pictures, accrued, terminated = [env.render()], np.zeros(2, np.float32), False
-    while not terminated:
-        masks = env.unwrapped.action_masks()
-        action = policy(observation[None], masks[None], accrued[None])[0]
-        observation, reward, terminated, _, _ = env.step(action)
-        accrued += reward
-        pictures.append(env.render())
-    return [Image.fromarray(picture).resize(FRAME_SIZE, Image.Resampling.LANCZOS) for picture in pictures]
-
-
-def trained_policy(run_dir: Path) -> tuple[Policy, str]:
-    """The sampled policy of a run, and the id of its environment."""
-    try:
-        probabilities = protocol.load_agent(run_dir)
-    except FileNotFoundError as error:
-        protocol.fail(f"--run-dir {run_dir}: {error}")
-    config = json.loads((run_dir / "config.json").read_text(encoding="utf-8"))
-    generator = np.random.default_rng(SEED)
-
-    def policy(observations, masks, accrued_returns):
-        return choose_actions(probabilities(observations, masks, accrued_returns), generator.random(len(masks)))
-
-    return policy, config["arguments"]["env_id"]
-
-
-def save_animation(path: Path, pictures: list[Image.Image]) -> None:
-    """An animated GIF that stays on its last picture for a while; the colours are those of its first and last."""
-    colours = Image.fromarray(np.concatenate([pictures[0], pictures[-1]])).quantize(256)
-    indexed = [picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures]
-    durations = [FRAME_MS] * (len(indexed) - 1) + [LAST_FRAME_MS]
-    frames = {"save_all": True, "append_images": indexed[1:], "duration": durations, "loop": 0}
-    with protocol.replacing(path) as file:
-        indexed[0].save(file, format="gif", **frames, optimize=True)
 
 
 def main(run_dir: Path | None = None, preference: float = 0.5, images: Path = Path("docs/images")) -> None:
@@ -91,13 +45,27 @@ def main(run_dir: Path | None = None, preference: float = 0.5, images: Path = Pa
         with protocol.replacing(images / "stand.png") as file:
             stand().save(file, format="png")
 
-        def heuristic(observations, masks, accrued_returns):
-            return conifer_restoration.policy(observations, masks)
+        def act(observation, mask, accrued_returns):
+            return int(conifer_restoration.policy(observation[None], mask[None])[0])
 
-        pictures = frames(heuristic, GENERALIST, preference)
-        save_animation(images / "conifer_restoration.gif", pictures)
+        env, name = gym.make(GENERALIST, render_mode="rgb_array"), "conifer_restoration"
     else:
-        save_animation(images / "trained_policy.gif", frames(*trained_policy(run_dir), preference))
+        policy, generator = trained_policy(run_dir), np.random.default_rng(SEED)
+
+        def act(observation, mask, accrued_returns):
+            return policy.act(observation, mask, accrued_returns, generator)
+
+        env, name = policy.task().make(render_mode="rgb_array"), "trained_policy"
+    frames, _ = command_line.play(env, act, SEED, np.array([preference, 1 - preference]))
+    command_line.save_animation(images / f"{name}.gif", frames)
+
+
+def trained_policy(run_dir: Path) -> protocol.Policy:
+    """The policy of a run."""
+    try:
+        return protocol.load_policy(run_dir)
+    except FileNotFoundError as error:
+        protocol.fail(f"--run-dir {run_dir}: {error}")
 
 
 if __name__ == "__main__":

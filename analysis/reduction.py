@@ -7,6 +7,7 @@ evaluation   every episode of both policies: weights, seeds, returns; what else 
 years        means of the annual record over the episodes of a weight, the columns of ANNUAL; a row a weight and year
 last_year    percentiles of the columns of SPREAD in the last year; a row a weight and column
 learning     the training in BINS equal parts: how many episodes, their means and standard deviations
+validation   gains on validation sites in the course of the training, as the run has them
 composition  the last fifth of the training: episodes by their last year's conifer fraction, in BINS classes
 sample       every EVERY-th round of the training's episodes, one by one
 selection    what a curriculum accepted, and how its threshold moved
@@ -53,6 +54,8 @@ def reduce(tables: dict[str, pd.DataFrame], steps: int | None, primary: str) -> 
     if "episodes" in tables:
         episodes = tables["episodes"]
         kept |= {"learning": learning(episodes, steps), "sample": sample(episodes)}
+        if "validation" in tables:
+            kept["validation"] = tables["validation"]
         if episodes[list(EPISODE_INFO)].notna().all(axis=None):
             kept["composition"] = composition(episodes)
         if "selected" in episodes:

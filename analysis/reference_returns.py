@@ -1,4 +1,5 @@
-"""Measures what ships with the code: returns of the constant plans and fixed strategies on the published test sites.
+"""Measures what ships with the code: returns of the constant plans and fixed strategies on the published test sites,
+and of the constant plans on the validation sites that a training's course is measured on.
 
     python analysis/reference_returns.py      # four minutes on two idle cores
 
@@ -16,7 +17,7 @@ import pandas as pd
 from analysis.studies.constant_plans import ENVIRONMENTS
 from baselines_heuristic import conifer_restoration, random_valid, target_density
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference, sites
+from cleanrl_style.protocol import course, reference, sites
 
 STRATEGIES = {
     "target_density": target_density.policy,
@@ -35,9 +36,9 @@ class Args:
     """the first of the test sites (None: all)"""
 
 
-def measure(task: protocol.Task, seeds: list[int]) -> pd.DataFrame:
-    """Returns of the constant plans and the fixed strategies on the first test sites."""
-    tables = [reference.measure(task, seeds)]
+def measure(task: protocol.Task, test: list[int], validation: list[int]) -> pd.DataFrame:
+    """Returns of the constant plans on sites of both splits, and of the fixed strategies on the first test sites."""
+    tables = [reference.measure(task, [*test, *validation])]
     for name, policy in STRATEGIES.items():
 
         def probabilities(observations, masks, accrued_returns, policy=policy):
@@ -45,23 +46,24 @@ def measure(task: protocol.Task, seeds: list[int]) -> pd.DataFrame:
             return np.eye(25)[chosen] if chosen.ndim == 1 else chosen
 
         corner = np.eye(task.num_objectives)[0]
-        episodes, _ = protocol.evaluate(task, probabilities, [corner], len(seeds), ("sampled",))
+        episodes, _ = protocol.evaluate(task, probabilities, [corner], len(test), ("sampled",))
         tables.append(episodes.assign(plan=name)[tables[0].columns])
     return pd.concat(tables, ignore_index=True)
 
 
 def main(args: Args) -> None:
     """Measure what is missing or of another physics."""
-    seeds = list(sites.published_seeds("test"))[: args.episodes]
+    test = list(sites.published_seeds("test"))[: args.episodes]
+    validation = list(sites.published_seeds("validation"))[: course.STANDS]  # of a training's course
     for env_id in ENVIRONMENTS:
         task, path = protocol.Task.of(env_id), args.folder / f"{env_id}.csv.gz"
         physics = reference.fingerprint(task)
         if path.exists():
             table, its_physics = reference.read(path)
-            if its_physics == physics and set(table.seed) == set(seeds):
+            if its_physics == physics and set(table.seed) == {*test, *validation}:
                 print(f"{path} is of this physics")
                 continue
-        reference.write(path, measure(task, seeds), physics)
+        reference.write(path, measure(task, test, validation), physics)
         print(f"wrote {path}")
 
 

@@ -47,6 +47,10 @@ class Args:
     """learning rate of Adam"""
     gamma: float = 1.0
     """discount factor"""
+    scalarization: Literal["linear", "chebyshev"] = "linear"
+    """what a return is worth: the weighted sum, or minus the largest weighted shortfall from an ideal point"""
+    ideal_point: tuple[float, ...] | None = None
+    """of chebyshev, a return for each objective (None: that of the constant plan which is best in it)"""
     utility: Literal["total", "future"] = "total"
     """what weights an action's gradient: utility of the episode's whole return, accrued and future; or of the future"""
     baseline: Literal["none", "others"] = "none"
@@ -117,21 +121,24 @@ def make_policy(agent):
     return action_probabilities
 
 
-def compute_utilities(rewards, preferences, gamma, which, baseline="none"):
+def compute_utilities(rewards, preferences, gamma, which, baseline="none", utility=protocol.scalarize):
     """Utility (steps, n) that weights each step's gradient, of n episodes with rewards (steps, n, m).
 
     The utility of a return is its scalarisation by the episode's preference (n, m). "total" is that of the whole
     return, accrued before the step and future, the same for all steps; "future" that of what comes from the step on.
-    "others" takes it less the other episodes' mean, which changes no expected gradient: it knows nothing of the action.
+    "others" takes it less what the other episodes' returns would be worth, at its own preference, in the mean. This
+    changes no expected gradient: it knows nothing of the action.
     """
     to_go = np.zeros_like(rewards)
     future = np.zeros(rewards.shape[1:])
     for t in reversed(range(len(rewards))):
         to_go[t] = future = rewards[t] + gamma * future
     returns = to_go if which == "future" else np.broadcast_to(to_go[0], to_go.shape)
+    utilities = utility(returns, preferences)
     if baseline == "others":
-        returns = returns - (returns.sum(axis=1, keepdims=True) - returns) / (returns.shape[1] - 1)
-    return protocol.scalarize(returns, preferences)
+        others = [utility(np.delete(returns, i, axis=1), own).mean(axis=1) for i, own in enumerate(preferences)]
+        utilities = utilities - np.stack(others, axis=1)
+    return utilities
 
 
 def eupg_loss(agent, x, mask, action, utility):
@@ -142,6 +149,8 @@ def eupg_loss(agent, x, mask, action, utility):
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
+    if args.scalarization == "chebyshev" and args.utility == "future":
+        protocol.fail("--utility future is for --scalarization linear: Chebyshev's is the utility of a whole return")
     args.eval_weights = (args.preference,)
     task = protocol.make_task(args, preference=args.preference, hide_site=args.hide_site)
     episode_columns = task.episode_columns
@@ -189,7 +198,7 @@ if __name__ == "__main__":
             iteration, global_step, episode = state["iteration"], state["global_step"], state["episode"]
             next_obs, batch_steps = state["next_obs"], state["batch_steps"]
 
-        progress = protocol.Progress("training", args.total_timesteps, "steps", global_step, task.objectives)
+        progress = run.progress(args.total_timesteps, global_step)
 
         # a batch is an episode of every environment; the last one is the last that the total has room for
         while global_step + batch_steps <= args.total_timesteps:
@@ -243,7 +252,9 @@ if __name__ == "__main__":
             update_start = time.perf_counter()
 
             # Optimizing the policy: one step of gradient ascent
-            utilities = compute_utilities(np.stack(rewards), preferences, args.gamma, args.utility, args.baseline)
+            utilities = compute_utilities(
+                np.stack(rewards), preferences, args.gamma, args.utility, args.baseline, task.utility
+            )
             loss, entropy = eupg_loss(
                 agent,
                 torch.cat(obs),
@@ -274,6 +285,7 @@ if __name__ == "__main__":
             batch_steps = len(rewards) * args.num_envs
             last = global_step + batch_steps > args.total_timesteps
             progress.show(global_step, last)
+            run.validate(global_step, last, make_policy(agent))
             state = {
                 "agent": agent.state_dict(),
                 "optimizer": optimizer.state_dict(),

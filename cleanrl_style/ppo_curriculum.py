@@ -63,6 +63,10 @@ class Args:
     """weight of the value loss"""
     max_grad_norm: float = 0.5
     """largest norm of the gradient"""
+    scalarization: Literal["linear", "chebyshev"] = "linear"
+    """what a return is worth: the weighted sum, or minus the largest weighted shortfall from an ideal point"""
+    ideal_point: tuple[float, ...] | None = None
+    """of chebyshev, a return for each objective (None: that of the constant plan which is best in it)"""
     reward_scales: tuple[float, ...] | None = None
     """factors of the rewards, before they are scalarised for training (None: 1 each)"""
     per_objective_advantages: bool = False
@@ -262,6 +266,8 @@ class Curriculum:
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
+    if args.scalarization == "chebyshev" and args.per_objective_advantages:
+        protocol.fail("--per-objective-advantages is for --scalarization linear: it weighs each advantage by itself")
     task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns
     update_columns = (
@@ -323,7 +329,7 @@ if __name__ == "__main__":
         steps_per_env = args.total_timesteps // args.num_envs
         rollout_length = args.rollout_steps // args.num_envs
         num_iterations = math.ceil(steps_per_env / rollout_length)
-        progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps", global_step, task.objectives)
+        progress = run.progress(steps_per_env * args.num_envs, global_step)
 
         for iteration in range(first_iteration, num_iterations + 1):
             # ALGO Logic: Storage setup (the last rollout may be shorter)
@@ -364,7 +370,9 @@ if __name__ == "__main__":
                 episode_returns += reward
                 scaled = reward * args.reward_scales
                 if not args.per_objective_advantages:
-                    scaled = protocol.scalarize(scaled, preferences)[:, None]
+                    # what the year adds to the utility of the returns; if that is linear, its rewards' weighted sum
+                    before = (episode_returns - reward) * args.reward_scales
+                    scaled = task.utility.gain(before, scaled, preferences)[:, None]
                 rewards[step] = torch.from_numpy(scaled)
                 weights[step] = torch.from_numpy(preferences)
 
@@ -450,6 +458,8 @@ if __name__ == "__main__":
             run.log("updates", row)
             run.time("update", global_step, time.perf_counter() - update_start)
 
+            last = iteration == num_iterations
+            run.validate(global_step, last, make_policy(agent))
             state = {
                 "agent": agent.state_dict(),
                 "optimizer": optimizer.state_dict(),
@@ -462,7 +472,7 @@ if __name__ == "__main__":
             # CURRICULUM
             state |= {"curriculum": vars(curriculum), "scores": scores, "thresholds": thresholds, "selected": selected}
 
-            run.save(global_step, last=iteration == num_iterations, **state)
+            run.save(global_step, last, **state)
 
         envs.close()
         run.save_policy(agent, num_values=num_values)

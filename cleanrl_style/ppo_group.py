@@ -61,6 +61,8 @@ class Args:
     """weight of the value loss"""
     max_grad_norm: float = 0.5
     """largest norm of the gradient"""
+    scalarization: Literal["linear", "chebyshev"] = "linear"
+    """what a return is worth: the weighted sum, or minus the largest weighted shortfall from an ideal point"""
     reward_scales: tuple[float, ...] | None = None
     """factors of the rewards, before they are scalarised for training (None: 1 each)"""
 
@@ -224,6 +226,8 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
 
 if __name__ == "__main__":
     args = protocol.parse(Args)
+    if args.scalarization == "chebyshev":
+        protocol.fail("--scalarization chebyshev: each objective has an advantage of its own here; linear is allowed")
     task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns
     if args.group_size < 1 or args.num_envs % args.group_size:
@@ -279,7 +283,7 @@ if __name__ == "__main__":
         steps_per_env = args.total_timesteps // args.num_envs
         rollout_length = args.rollout_steps // args.num_envs
         num_iterations = math.ceil(steps_per_env / rollout_length)
-        progress = protocol.Progress("training", steps_per_env * args.num_envs, "steps", global_step, task.objectives)
+        progress = run.progress(steps_per_env * args.num_envs, global_step)
 
         for iteration in range(first_iteration, num_iterations + 1):
             optimizer.param_groups[0]["lr"] = args.learning_rate * (1.0 - (iteration - 1.0) / num_iterations)
@@ -404,6 +408,8 @@ if __name__ == "__main__":
             run.log("updates", row)
             run.time("update", global_step, time.perf_counter() - update_start)
 
+            last = iteration == num_iterations
+            run.validate(global_step, last, make_policy(agent))
             state = {
                 "agent": agent.state_dict(),
                 "optimizer": optimizer.state_dict(),
@@ -414,7 +420,7 @@ if __name__ == "__main__":
                 "episode_returns": episode_returns,
             }
 
-            run.save(global_step, last=iteration == num_iterations, **state)
+            run.save(global_step, last, **state)
 
         envs.close()
         run.save_policy(agent, num_values=num_values)

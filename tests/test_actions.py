@@ -215,7 +215,7 @@ def test_masks_are_the_rule_with_half_of_what_is_negligible_to_spare():
     "arguments",
     [
         {},
-        {"mode": "site_specific", "harvest_min_class": "mature"},
+        {"mode": "site-specific", "harvest_min_class": "mature"},
         {"objectives": THREE},
         {"objectives": (TIMBER,), "harvest_min_class": "old"},
         {"observation_groups": ("age", "climate", "state")},

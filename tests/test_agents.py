@@ -47,5 +47,5 @@ def test_an_agent_of_another_network_is_refused(tmp_path):
 
 
 def test_a_folder_without_a_policy_is_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match="has no config.json: a finished run"):
-        protocol.load_agent(tmp_path)
+    with pytest.raises(FileNotFoundError, match="neither the folder of a finished run, with policy.pt"):
+        protocol.load_policy(tmp_path)

@@ -122,7 +122,7 @@ def test_a_spawned_worker_needs_nothing_but_the_id():
 
 
 def test_instances_do_not_disturb_each_other():
-    one, other = quick(), quick(mode="site_specific")
+    one, other = quick(), quick(mode="site-specific")
     one.reset(seed=1), other.reset(seed=9)
     rewards = [(one.step(action)[1], other.step(24 - action)[1])[0] for action in (24, 0, 17, 3)]
     np.testing.assert_array_equal(rewards, play(quick(), [24, 0, 17, 3], seed=1)[1])
@@ -177,7 +177,7 @@ def test_memory_is_bounded_over_any_number_of_episodes():
 def test_an_environment_says_what_it_is():
     env = gym.make("boreal-site-specific-v0", site_seed=5, thaw_formulation="contrast", objectives=THREE, years=7)
     for one in (env.unwrapped, env.unwrapped.lockstep(2)):
-        assert (one.mode, one.years, one.site_seed, one.thaw_formulation) == ("site_specific", 7, 5, "contrast")
+        assert (one.mode, one.years, one.site_seed, one.thaw_formulation) == ("site-specific", 7, 5, "contrast")
         assert (one.objective_names, one.reward_dim) == (("carbon", "thaw", "timber"), 3)
         assert one.observation_names[:3] == ("preference_carbon", "preference_thaw", "year")
 
@@ -192,3 +192,27 @@ def test_lockstep_has_the_same_arguments_but_for_the_changes():
             assert_same(a, b)
     with pytest.raises(ValueError, match="unknown argument 'carbon_price'"):
         env.lockstep(4, carbon_price=3)
+
+
+@pytest.mark.parametrize("years", [50, 3])
+def test_its_spec_says_how_long_an_episode_is(years):
+    env, envs = (make("boreal-generalist-v0", years=years) for make in (gym.make, gym.make_vec))
+    assert env.spec.max_episode_steps == env.unwrapped.spec.max_episode_steps == envs.spec.max_episode_steps == years
+    assert BorealEnv().spec is None and gym.spec("boreal-generalist-v0").max_episode_steps is None
+    env = gym.make("boreal-generalist-v0", **{**QUICK, "years": 2})  # in no TimeLimit: its end is its own
+    env.reset(seed=1)
+    assert [env.step(12)[2:4] for _ in range(2)] == [(False, False), (True, False)]
+
+
+def test_every_step_has_its_record_if_asked():
+    env, envs = quick(record_steps=True, record_years=True), quick_vector(2, record_steps=True)
+    env.reset(seed=3), envs.reset(seed=[3, 4])
+    terminated, densities = False, []
+    while not terminated:
+        *_, terminated, _, info = env.step(22)
+        *_, together = envs.step(np.array([22, 22]))
+        assert tuple(info["record"]) == boreal_env.HISTORY_NAMES
+        assert info["record"] == {name: together["record"][name][0] for name in boreal_env.HISTORY_NAMES}
+        densities.append(info["record"]["density_stems_ha"])
+    np.testing.assert_array_equal(densities, info["years"]["density_stems_ha"])
+    assert together["_record"].all() and together["record"]["_density_stems_ha"].all()

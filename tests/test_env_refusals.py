@@ -7,7 +7,7 @@ from playing import NAN, play, quick, quick_vector
 from boreal_env import BorealEnv, BorealVectorEnv
 
 BAD_ARGUMENTS = {
-    "mode": ({"mode": "specialist"}, r"mode 'specialist': allowed are generalist, site_specific"),
+    "mode": ({"mode": "specialist"}, r"mode 'specialist': allowed are generalist, site-specific"),
     "years 0": ({"years": 0}, r"years: an integer in \[1, 1000\] is allowed, got 0"),
     "years of float": ({"years": 1.5}, r"years: .* got 1.5"),
     "years of bool": ({"years": True}, r"years: .* got True"),
@@ -59,7 +59,7 @@ BAD_ARGUMENTS = {
     "groups as text": ({"observation_groups": "state"}, r"observation_groups.*'state'"),
     "groups as number": ({"observation_groups": 5}, r"observation_groups.*5"),
     "no groups": ({"observation_groups": ()}, r"observation_groups"),
-    "no group left": ({"observation_groups": ("site",), "mode": "site_specific"}, r"observation_groups.*site"),
+    "no group left": ({"observation_groups": ("site",), "mode": "site-specific"}, r"observation_groups.*site"),
     "group twice": ({"observation_groups": ("age", "state", "age")}, r"observation_groups age, state, age: each"),
     "boundary": ({"boundary": "fixed"}, r"boundary 'fixed': allowed are sampled, balanced"),
     "soil carbon": ({"soil_carbon": 1.0}, r"soil_carbon 1.0: allowed are drawn, balanced"),

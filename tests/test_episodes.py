@@ -45,7 +45,7 @@ def test_info_is_empty_until_the_end():
 
 
 def test_seeds_of_the_fixed_world_are_what_the_page_says():
-    default, other = (play(quick(mode="site_specific", **k), ACTIONS, seed=1)[2] for k in ({}, {"site_seed": 5}))
+    default, other = (play(quick(mode="site-specific", **k), ACTIONS, seed=1)[2] for k in ({}, {"site_seed": 5}))
     assert (default["site_seed"], default["episode_seed"]) == (-1, 0)
     assert (other["site_seed"], other["episode_seed"]) == (5, 5)
 
@@ -137,7 +137,7 @@ def test_the_interpreted_backend_gives_the_same_episode():
 
 
 def test_site_specific_mode_is_one_world_whatever_the_seed():
-    episodes = [play(quick(mode="site_specific", record_years=True), ACTIONS, seed=seed) for seed in (1, 2)]
+    episodes = [play(quick(mode="site-specific", record_years=True), ACTIONS, seed=seed) for seed in (1, 2)]
     (one, rewards, info), (other, other_rewards, other_info) = episodes
     assert one.shape[1] == WITHOUT_SITE
     np.testing.assert_array_equal(one[:, 1:], other[:, 1:])
@@ -147,7 +147,7 @@ def test_site_specific_mode_is_one_world_whatever_the_seed():
 
 
 def test_site_specific_mode_is_the_middle_of_every_range_without_noise():
-    observation, _ = quick(mode="site_specific").reset(seed=1)
+    observation, _ = quick(mode="site-specific").reset(seed=1)
     middle = {
         "density": 300.0 / 1500.0,
         "conifer_fraction": 0.5,
@@ -164,8 +164,8 @@ def test_site_specific_mode_is_the_middle_of_every_range_without_noise():
 
 
 def test_site_specific_mode_with_another_site():
-    default = play(quick(mode="site_specific"), ACTIONS, seed=1)
-    other, again = (play(quick(mode="site_specific", site_seed=5), ACTIONS, seed=seed) for seed in (1, 2))
+    default = play(quick(mode="site-specific"), ACTIONS, seed=1)
+    other, again = (play(quick(mode="site-specific", site_seed=5), ACTIONS, seed=seed) for seed in (1, 2))
     assert not np.array_equal(default[0][0, CLIMATE], other[0][0, CLIMATE])
     np.testing.assert_array_equal(other[0][:, 1:], again[0][:, 1:])
     latitude = sim.sample_site(5)["latitude_deg"]

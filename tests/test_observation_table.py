@@ -237,7 +237,7 @@ def test_observation_groups(groups):
 
 def test_observation_names_of_the_modes():
     assert quick().observation_names == OBSERVATION_NAMES
-    assert quick_vector(2, mode="site_specific").observation_names == OBSERVATION_NAMES[:WITHOUT_SITE]
+    assert quick_vector(2, mode="site-specific").observation_names == OBSERVATION_NAMES[:WITHOUT_SITE]
 
 
 # -------------------------------------------------------------------------------------------------- a row more
@@ -255,7 +255,7 @@ def test_a_row_is_all_that_a_new_entry_needs(monkeypatch):
     assert new[0, 2] == 0.0
     np.testing.assert_allclose(new[1:, 2], info["years"]["peak_swe_mm"] / 100.0, rtol=1e-6)
     np.testing.assert_array_equal(boreal_env.action_masks(new[-1])[0], env.action_masks())
-    assert quick(mode="site_specific").observation_space.shape == (WITHOUT_SITE + 1,)
+    assert quick(mode="site-specific").observation_space.shape == (WITHOUT_SITE + 1,)
     assert quick(observation_groups=("snow",)).observation_names == ("snowpack",)
     assert "| 2 | `snowpack` | mm | x / 100 | 0 .. 10000 | snow |" in document_environment.page()
 
@@ -282,7 +282,7 @@ def test_a_column_that_the_record_has_not_is_refused_where_the_row_is_written():
 
 
 def test_entries_can_be_read_in_their_unit():
-    env = quick(mode="site_specific")
+    env = quick(mode="site-specific")
     observations = env.reset(seed=1)[0][None]
     assert boreal_env.in_unit(observations, "density")[0] == pytest.approx(300.0, rel=1e-6)
     assert boreal_env.in_unit(observations, "latitude", env.observation_names)[0] == pytest.approx(60.5, rel=1e-6)

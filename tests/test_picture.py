@@ -11,6 +11,7 @@ from PIL import Image
 import boreal_env
 from analysis import draw_readme
 from cleanrl_style import ppo_curriculum
+from cleanrl_style.protocol.command_line import FRAME_SIZE, save_animation
 from sim.task.picture import HEIGHT, WIDTH, preference, return_charts, view_of
 
 NO_FIRE = {"fire": False, "insects": False}
@@ -104,10 +105,10 @@ def test_frames_of_a_video():
 
 
 def test_an_animation_has_all_frames_and_colours(tmp_path):
-    pictures = [Image.new("RGB", draw_readme.FRAME_SIZE, colour) for colour in ("red", "blue", "red", "blue")]
-    draw_readme.save_animation(tmp_path / "four.gif", pictures)
+    pictures = [Image.new("RGB", FRAME_SIZE, colour) for colour in ("red", "blue", "red", "blue")]
+    save_animation(tmp_path / "four.gif", [np.array(picture) for picture in pictures])
     with Image.open(tmp_path / "four.gif") as animation:
-        assert animation.n_frames == 4 and animation.size == draw_readme.FRAME_SIZE
+        assert animation.n_frames == 4 and animation.size == FRAME_SIZE
         for k, primary in enumerate((0, 2, 0, 2)):
             animation.seek(k)
             assert animation.convert("RGB").getpixel((0, 0))[primary] > 200
@@ -119,15 +120,15 @@ def test_the_policy_of_a_run_is_played(tmp_path):
     torch.save(saved, tmp_path / "policy.pt")
     config = {"script": "ppo_curriculum", "arguments": {"env_id": "boreal-site-specific-v0"}}
     (tmp_path / "config.json").write_text(json.dumps(config))
-    policy, env_id = draw_readme.trained_policy(tmp_path)
-    assert env_id == "boreal-site-specific-v0"
+    policy = draw_readme.trained_policy(tmp_path)
+    assert policy.env_id == "boreal-site-specific-v0" and not policy.looks_back
     masks = np.zeros((2, 25), bool)
     masks[0, 3] = masks[1, 24] = True
-    assert policy(np.zeros((2, 43), np.float32), masks, np.zeros((2, 2), np.float32)).tolist() == [3, 24]
+    assert policy.act(np.zeros((2, 43), np.float32), masks).tolist() == [3, 24]
 
 
 def test_a_folder_without_a_policy_is_refused(tmp_path):
-    with pytest.raises(SystemExit, match="no config.json"):
+    with pytest.raises(SystemExit, match="neither the folder of a finished run"):
         draw_readme.trained_policy(tmp_path)
 
 

@@ -1,11 +1,11 @@
 """What every training script and heuristic shares, whatever its algorithm: the one import of the scripts.
 
 A script reads its arguments (`parse`), asks the environment what it is (`make_task`), opens its folder (`Run`), trains
-on `run.make_envs()`, logs rows, saves checkpoints and shows `Progress` meanwhile, and ends with `run.save_policy`,
-`evaluate` and `run.finish`. `load_agent` gives the policy of a finished run.
+on `run.make_envs()`, logs rows, shows `run.progress`, plays `run.validate` and saves checkpoints meanwhile, and ends
+with `run.save_policy`, `evaluate` and `run.finish`. `load_policy` gives a finished run's policy, or one that ships.
 """
 
-from cleanrl_style.protocol.agents import load_agent
+from cleanrl_style.protocol.agents import Policy, load_agent, load_policy, shipped_policies
 from cleanrl_style.protocol.arguments import LIMITS, MAX_ENVS, fail, make_task, not_default, parse
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.evaluation import POLICIES, evaluate
@@ -25,6 +25,7 @@ __all__ = [
     "LIMITS",
     "MAX_ENVS",
     "POLICIES",
+    "Policy",
     "TIMING_COLUMNS",
     "Progress",
     "Run",
@@ -36,10 +37,12 @@ __all__ = [
     "final_info",
     "flat_parameters",
     "load_agent",
+    "load_policy",
     "make_task",
     "not_default",
     "observed_weights",
     "parse",
     "replacing",
     "scalarize",
+    "shipped_policies",
 ]

@@ -1,49 +1,123 @@
-"""Trained agents, loaded again from their run's folder."""
+"""Trained policies to hold: loaded from a run's folder, from a policy file, or by the name of one that ships."""
 
 import importlib
 import importlib.util
 import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 from gymnasium.spaces import Box
 
+from cleanrl_style.protocol.arguments import make_task
+from cleanrl_style.protocol.evaluation import choose_actions
+from cleanrl_style.protocol.task import Task
 
-def load_agent(run_folder, script=None):
-    """The policy that a run has trained, as the evaluation plays it.
+FOLDER, FILE = "policies", "policy.pt"  # of those that ship; in a run's folder
 
-    run_folder : with config.json and policy.pt. script : path of the script that trained it, if that does not lie in
-    cleanrl_style/.
-    Returns a function of observations (n, d) float32, masks (n, 25) bool and accrued returns (n, m), all numpy, that
-    gives action probabilities (n, 25). Raises FileNotFoundError if one of the files, or the script, is missing, and
-    ValueError if the script's network is another one by now.
+
+@dataclass(frozen=True)
+class Policy:
+    """A trained policy: `act` gives its actions, `probabilities` all that it says."""
+
+    name: str
+    script: str  # that trained it, with these arguments
+    arguments: dict
+    probabilities: Callable  # of observations (n, d), masks (n, 25), accrued returns (n, m): probabilities (n, 25)
+    size: int  # d, entries of the observation
+    looks_back: bool  # whether it needs the returns accrued so far, as EUPG does
+
+    def act(self, observation, mask, accrued_returns=None, generator: np.random.Generator | None = None):
+        """The most probable action of an observation (d,) as an int, or of several (n, d) as an array (n,).
+
+        mask : valid actions, bool, `env.unwrapped.action_masks()`. accrued_returns : (m,) or (n, m), the rewards of the
+        episode so far, which EUPG's policies look at. generator : draws the action instead.
+        """
+        observations, masks = np.atleast_2d(np.asarray(observation, np.float32)), np.atleast_2d(np.asarray(mask, bool))
+        if observations.shape[1] != self.size or masks.shape != (len(observations), 25):
+            raise ValueError(
+                f"{self.name}: observations (n, {self.size}) and masks (n, 25) are allowed, got "
+                f"{observations.shape} and {masks.shape}"
+            )
+        if accrued_returns is None and self.looks_back:
+            raise ValueError(f"{self.name} looks at the returns accrued so far: give accrued_returns")
+        accrued = np.zeros((len(masks), 0)) if accrued_returns is None else np.atleast_2d(accrued_returns)
+        uniforms = None if generator is None else generator.random(len(masks))
+        actions = choose_actions(self.probabilities(observations, masks, accrued), uniforms)
+        return int(actions[0]) if np.ndim(observation) == 1 else actions
+
+    @property
+    def env_id(self) -> str:
+        """The environment that it was trained on."""
+        return self.arguments["env_id"]
+
+    def task(self) -> Task:
+        """That environment with the arguments of its training; `task().make()` is one."""
+        arguments = SimpleNamespace(**{**self.arguments, "scalarization": "linear", "ideal_point": None})
+        return make_task(arguments, hide_site=self.arguments.get("hide_site", False))
+
+
+def shipped_policies() -> dict[str, Path]:
+    """The policies that ship: name -> file."""
+    folder = Path(str(files("cleanrl_style"))) / FOLDER
+    return {path.stem: path for path in sorted(folder.glob("*.pt"))}
+
+
+def load_policy(run_or_name, script=None) -> Policy:
+    """A trained policy.
+
+    run_or_name : a run's folder, a policy file (its policy.pt), or the name of a policy that ships. script : path of
+    the script that trained it, if that does not lie in cleanrl_style/. Raises FileNotFoundError if there is no such
+    policy, or not the script, and ValueError if the script's network is another one by now.
     """
     import torch
 
-    folder = Path(run_folder)
-    for name in ("config.json", "policy.pt"):
-        if not (folder / name).exists():
-            raise FileNotFoundError(f"{folder} has no {name}: a finished run of a training script has both")
-    name = json.loads((folder / "config.json").read_text(encoding="utf-8"))["script"]
-    saved = torch.load(folder / "policy.pt", weights_only=True)
-    module = _script_module(name, script)
+    path, ships = Path(run_or_name), shipped_policies()
+    if path.is_dir():
+        path = path / FILE
+    elif not path.exists():
+        path = ships.get(str(run_or_name), path)
+    if not path.exists():
+        raise FileNotFoundError(
+            f"{run_or_name}: neither the folder of a finished run, with {FILE}, nor such a file, nor a policy that "
+            f"ships ({', '.join(ships) or 'none does yet'})"
+        )
+    saved = torch.load(path, weights_only=True)
+    run = saved.get("run") or json.loads((path.parent / "config.json").read_text(encoding="utf-8"))
+    module = _script_module(run["script"], script)
     space = Box(-np.inf, np.inf, tuple(saved["observation_shape"]), np.float32)
     agent = module.Agent(SimpleNamespace(single_observation_space=space), **saved["arguments"])
     try:
-        agent.load_state_dict(saved["agent"])
+        # a policy that ships is without its critic, which chooses nothing
+        critic = {name: value for name, value in agent.state_dict().items() if name.startswith("critic.")}
+        agent.load_state_dict({**critic, **saved["agent"]})
     except RuntimeError as error:
-        raise ValueError(
-            f"{folder / 'policy.pt'}: another version of {name}.py trained it, of another network"
-        ) from error
-    return module.make_policy(agent)
+        raise ValueError(f"{path}: another version of {run['script']}.py trained it, of another network") from error
+    probabilities, (size,) = module.make_policy(agent), space.shape
+    unknown = np.full((1, _objectives(run["arguments"])), np.nan)
+    looks_back = bool(np.isnan(probabilities(np.zeros((1, size), np.float32), np.ones((1, 25), bool), unknown)).any())
+    return Policy(str(run_or_name), run["script"], run["arguments"], probabilities, size, looks_back)
+
+
+def load_agent(run_folder, script=None) -> Callable:
+    """The policy of a run as the evaluation plays it: `load_policy(run_folder, script).probabilities`."""
+    return load_policy(run_folder, script).probabilities
+
+
+def _objectives(arguments: dict) -> int:
+    """Number of objectives, from the evaluation's weights: of two each is a number."""
+    first = arguments.get("eval_weights", [0.0])[0]
+    return np.size(first) if np.ndim(first) else 2
 
 
 def _script_module(name: str, path) -> ModuleType:
     """The script as a module."""
     if path is None:
         if importlib.util.find_spec(f"cleanrl_style.{name}") is None:
-            raise FileNotFoundError(f"no cleanrl_style/{name}.py; load_agent(run_folder, script=path) names another")
+            raise FileNotFoundError(f"no cleanrl_style/{name}.py; load_policy(run_folder, script=path) names another")
         return importlib.import_module(f"cleanrl_style.{name}")
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or not Path(path).exists():

@@ -11,11 +11,14 @@ import numpy as np
 import tyro
 
 import boreal_env
-from cleanrl_style.protocol.fronts import evaluation_weights
-from cleanrl_style.protocol.sites import FIRST_EVALUATION_SEED, evaluation_seeds
+from cleanrl_style.protocol.fronts import evaluation_weights, return_columns
+from cleanrl_style.protocol.reference import reference_returns
+from cleanrl_style.protocol.sites import FIRST_EVALUATION_SEED, evaluation_seeds, published_seeds
 from cleanrl_style.protocol.task import Task
+from cleanrl_style.protocol.utility import Utility
 
 MAX_ENVS = 1000
+ONE_SITE_EPISODES = 32  # that an ideal point is taken from, where a task has one site under many weathers
 DEFAULT_STEPS = {"generalist": 300_000, "site-specific": 100_000}  # of a training, by the environment's mode
 # Arguments that change nothing in what a run computes.
 FREE_ARGUMENTS = ("run_dir", "overwrite", "track", "wandb_project_name")
@@ -55,10 +58,11 @@ def describe(arguments: type) -> str:
         return arguments.__doc__
     return f"""{arguments.__doc__}
 
-    python {sys.argv[0]} --vectorization lockstep --total-timesteps 3200
+    python {sys.argv[0]} --vectorization lockstep --total-timesteps 32000 --eval-episodes 20
 
-is a trial. Without the last flag it trains for 300,000 steps. A stopped run goes on with the same command, to the same
-bytes. The folder gets config.json, episodes.csv, updates.csv, evaluation.csv and summary.png, which docs/algorithms
+is a trial of a minute on two cores. Without the last two flags it trains for 300,000 steps and is evaluated on 200
+sites, for ten minutes. A stopped run goes on with the same command, to the same bytes. The folder gets config.json,
+episodes.csv, updates.csv, validation.csv, evaluation.csv, policy.pt and summary.png, which docs/algorithms
 explains; python analysis/make_tables.py sets it beside other runs."""
 
 
@@ -132,7 +136,33 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
     for package in getattr(args, "track", ()):
         if importlib.util.find_spec(package) is None:
             fail(f"--track {package}: the package is not installed (pip install {package})")
+    if getattr(args, "scalarization", "linear") == "chebyshev":
+        return dataclasses.replace(task, utility=Utility(ideal_point(task, args.ideal_point)))
+    if getattr(args, "ideal_point", None) is not None:
+        fail("--ideal-point is for --scalarization chebyshev")
     return task
+
+
+def ideal_point(task: Task, given=None) -> tuple[float, ...]:
+    """The point that Chebyshev's utility measures from, a return for each objective.
+
+    In each objective it is the return of the constant plan which is best in it, mean of the task's test episodes (on
+    one site, of ONE_SITE_EPISODES weathers): fixed by the task, whatever is learned. given : by the user instead.
+    """
+    names = ", ".join(task.objectives)
+    if given is None and not task.boreal:
+        fail(f"--ideal-point: a return for each of {names} is needed, as --env-id {task.env_id} has no constant plans")
+    if given is None:
+        weathers = 1 if task.mode == "site-specific" else ONE_SITE_EPISODES
+        episodes = len(published_seeds("test")) if task.draws_sites else weathers
+        plans = reference_returns(task, evaluation_seeds(task, episodes))
+        plans = plans[plans.plan.str.isdigit()]
+        given = plans.groupby("plan")[return_columns(task.objectives)].mean().max().round(2)
+        shown = (f"{name} {value:g}" for name, value in zip(task.objectives, given, strict=True))
+        print(f"Chebyshev's ideal point: {', '.join(shown)}")
+    if len(given) != task.num_objectives or not np.isfinite(given).all():
+        fail(f"--ideal-point: {task.num_objectives} finite numbers, of {names}, are allowed, not {list(given)}")
+    return tuple(float(value) for value in given)
 
 
 def name_environment(args) -> str:

@@ -11,12 +11,12 @@ import numpy as np
 class Progress:
     """One line that says how far a job is: rewritten in place on a terminal, else one every ten seconds.
 
-    `returns` holds the last episodes' returns in the `objectives`, whose means the line shows.
+    `returns` holds the last episodes' returns in the `objectives`, whose means the line shows while there is no `note`.
     """
 
-    def __init__(self, label: str, total: int, unit: str, done: int = 0, objectives=()):
-        """done: what an earlier process has done of it."""
-        self.objectives = objectives
+    def __init__(self, label: str, total: int, unit: str, done: int = 0, objectives=(), then=lambda rate: 0.0):
+        """done: what an earlier process has done of it; then: at a rate, seconds of what comes afterwards."""
+        self.objectives, self.then, self.note = objectives, then, ""
         self.label, self.total, self.unit, self.done_before = label, total, unit, done
         self.terminal = sys.stdout.isatty()
         self.interval = 0.5 if self.terminal else 10.0
@@ -34,9 +34,11 @@ class Progress:
         rate = (done - self.done_before) / (now - self.start)
         line = (
             f"{self.label} {done:,}/{self.total:,} {self.unit}, {rate:,.0f}/s, "
-            f"{(self.total - done) / rate / 60:.1f} min left"
+            f"{((self.total - done) / rate + self.then(rate)) / 60:.1f} min left"
         )
-        if self.returns:
+        if self.note:
+            line += f", {self.note}"
+        elif self.returns:
             means = zip(self.objectives, np.mean(self.returns, axis=0), strict=True)
             line += "".join(f", {name} {mean:+.2f}" for name, mean in means)
         if self.terminal:

@@ -23,11 +23,13 @@ import pandas as pd
 
 from cleanrl_style.protocol import tracking, training_envs
 from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, fail, not_default
-from cleanrl_style.protocol.evaluation import PRIMARY, lanes_of_evaluation
+from cleanrl_style.protocol.course import Course
+from cleanrl_style.protocol.evaluation import PRIMARY, episodes_by_policy, lanes_of_evaluation
 from cleanrl_style.protocol.files import replacing
+from cleanrl_style.protocol.progress import Progress
 from cleanrl_style.protocol.reference import reference_returns
 from cleanrl_style.protocol.score import Comparison
-from cleanrl_style.protocol.summary import draw_summary, print_score, print_table
+from cleanrl_style.protocol.summary import draw_summary, print_course, print_score, print_table
 from cleanrl_style.protocol.task import Task
 
 try:
@@ -43,6 +45,7 @@ RESULTS = (
     "policy.pt",
     "episodes.csv",
     "updates.csv",
+    "validation.csv",
     "evaluation_years.csv",
     "summary.png",
 )
@@ -99,13 +102,19 @@ class Run:
             "arguments": {k: value for k, value in vars(args).items() if k not in FREE_ARGUMENTS},
             "not_default": changed,
             "primary_policy": PRIMARY,
+            **({"ideal_point": task.utility.ideal} if task.utility.ideal else {}),
             "versions": versions(),
             "commit": commit(),
         }
         self.envs, self.checkpoint, self.checkpoint_step = None, None, 0
+        self.env_seconds, self.shown, self.course = 0.0, None, None
         with self._writing():
             self._claim_folder()
             self._load_checkpoint()
+            self.first_step = self.env_step = self.checkpoint_step  # of this process, so far
+            if task.boreal and hasattr(args, "total_timesteps"):
+                self.course = Course(task, args.total_timesteps, args.eval_episodes, self.checkpoint_step)
+                tables = {**tables, "validation": self.course.columns}
             sizes = self.checkpoint["table_sizes"] if self.checkpoint else {}
             self.tables |= {
                 name: Table(self.folder / f"{name}.csv", columns, sizes.get(name, 0))
@@ -242,8 +251,38 @@ class Run:
         """The vector environment to train on, which ends with the run; env_kwargs : what the evaluation's lack."""
         args = self.args
         later = lanes_of_evaluation(self.task, len(args.eval_weights), args.eval_episodes)
+        if self.course is not None:
+            later = [*self.course.lanes, *later]
         self.envs = training_envs.make_training_envs(self.task, args.num_envs, args.vectorization, later, **env_kwargs)
         return self.envs
+
+    def progress(self, steps: int, done: int) -> Progress:
+        """The line that says how far the training is; the time left has the evaluation in it."""
+        self.shown = Progress("training", steps, "steps", done, self.task.objectives, self._seconds_of_evaluation)
+        return self.shown
+
+    def _seconds_of_evaluation(self, rate: float) -> float:
+        """What the evaluation will take, by the environments' own time or, before that is known, by the training's."""
+        args = self.args
+        episodes = len(args.eval_weights) * sum(episodes_by_policy(self.task, args.eval_episodes).values())
+        steps = self.env_step - self.first_step
+        return episodes * (self.task.years or 0) * (self.env_seconds / steps if steps else 1 / rate)
+
+    def validate(self, global_step: int, last: bool, policy) -> None:
+        """At some shares of the training and at its end: what the greedy policy gains on the validation sites.
+
+        policy : as for `evaluate`. Its gains go into validation.csv, its score into the progress line. Does nothing in
+        environments of which it is not known what doing nothing returns.
+        """
+        if self.course is None or not self.course.is_due(global_step, last):
+            return
+        start = time.perf_counter()
+        gained = self.course.play(policy)
+        for row in gained.to_dict("records"):
+            self.log("validation", {"global_step": global_step, **row})
+        if self.shown is not None:
+            self.shown.note = f"score {self.course.score(gained):.0f} on {len(self.course.seeds)} validation sites"
+        self.time("validation", global_step, time.perf_counter() - start)
 
     def log(self, table: str, row: dict) -> None:
         """Append a row to one of the run's tables."""
@@ -254,6 +293,8 @@ class Run:
 
     def time(self, phase: str, global_step: int, seconds: float) -> None:
         """Append to timing.csv, the only file that depends on the clock."""
+        if phase == "environment":
+            self.env_seconds, self.env_step = self.env_seconds + seconds, global_step
         with self._writing():
             self.tables["timing"].write(
                 {
@@ -265,12 +306,15 @@ class Run:
             )
 
     def save_policy(self, agent, **arguments) -> None:
-        """Write policy.pt, weights alone: what `load_agent` makes the agent of. arguments : the Agent's own."""
+        """Write policy.pt, what `load_policy` makes the policy of: no code in it. arguments : the Agent's own."""
         import torch
 
         buffer = io.BytesIO()
         shape = self.envs.single_observation_space.shape
-        torch.save({"agent": agent.state_dict(), "arguments": arguments, "observation_shape": shape}, buffer)
+        own = {name: value for name, value in self.config["arguments"].items() if name != "vectorization"}
+        run = json.loads(json.dumps({"script": self.script, "arguments": own}))  # the same bytes, async or lockstep
+        policy = {"agent": agent.state_dict(), "arguments": arguments, "observation_shape": shape, "run": run}
+        torch.save(policy, buffer)
         with self._writing(), replacing(self.folder / "policy.pt") as file:
             file.write(buffer.getvalue())
 
@@ -278,7 +322,7 @@ class Run:
         """Write the evaluation and the picture, print the table, and so declare the run finished."""
         objectives, start = self.task.objectives, time.perf_counter()
         plans = reference_returns(self.task, evaluation.seed.drop_duplicates().tolist())
-        comparison = None if plans is None else Comparison(evaluation, plans)
+        comparison = None if plans is None else Comparison(evaluation, plans, self.task.utility)
         self.time("reference", 0, time.perf_counter() - start)
         with self._writing():
             if years is not None:
@@ -286,14 +330,15 @@ class Run:
                     years.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
             with replacing(self.folder / "summary.png") as file:
                 title = f"{self.script}, {self.args.env_id}, seed {self.args.seed}"
-                episodes = self.folder / "episodes.csv"
-                draw_summary(file, title, objectives, evaluation, years, episodes, comparison)
+                draw_summary(file, title, objectives, evaluation, years, self.folder, comparison, self.course)
             with replacing(self.folder / "evaluation.csv") as file:
                 evaluation.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
         if comparison is None:
             print_table(objectives, evaluation)
         else:
             print_score(objectives, comparison)
+        if self.course is not None:
+            print_course(self.course, pd.read_csv(self.folder / "validation.csv"))
         print(f"{self.folder}: finished in {time.perf_counter() - self.start:.0f} s")
 
     @contextlib.contextmanager

@@ -20,6 +20,7 @@ from cleanrl_style.protocol.fronts import (
     weights_of,
 )
 from cleanrl_style.protocol.reference import NOTHING, PLUS_100
+from cleanrl_style.protocol.utility import LINEAR, Utility
 
 
 def mean_scalarized(evaluation: pd.DataFrame) -> float:
@@ -33,8 +34,8 @@ def by_weight(evaluation: pd.DataFrame):
     return evaluation.groupby(weights[0] if len(weights) == 1 else weights)
 
 
-def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame) -> pd.DataFrame:
-    """The evaluation with the returns of zero change on the same site and weather subtracted.
+def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame, utility: Utility = LINEAR) -> pd.DataFrame:
+    """The evaluation with the returns of zero change on the same site and weather subtracted; of utilities likewise.
 
     Raises ValueError if zero change was not evaluated on every one of the evaluation's seeds.
     """
@@ -47,31 +48,32 @@ def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame) -> pd.DataFrame:
             f"(nor on {len(missing) - 1} others); evaluate both with the same --eval-episodes"
         )
     difference = evaluation.copy()
-    difference[columns] -= reference.loc[evaluation.seed].to_numpy()
-    difference["scalarized_return"] = scalarize(returns_of(difference), weights_of(difference))
+    nothing = reference.loc[evaluation.seed].to_numpy()
+    difference[columns] -= nothing
+    difference["scalarized_return"] = utility.gain(nothing, returns_of(difference), weights_of(difference))
     return difference
 
 
-def at_weights(episodes: pd.DataFrame, weights: np.ndarray) -> pd.DataFrame:
+def at_weights(episodes: pd.DataFrame, weights: np.ndarray, utility: Utility = LINEAR) -> pd.DataFrame:
     """Episodes of what does not look at the preference as an evaluation: once for each of the weights (k, m)."""
     objectives, tables = objectives_of(episodes.columns), []
     for one in weights:
         columns = dict(zip(weight_columns(objectives), one, strict=len(objectives) != 2))
         table = episodes.assign(**columns)
-        table["scalarized_return"] = scalarize(returns_of(table), one)
+        table["scalarized_return"] = utility(returns_of(table), one)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
 
 
-def best_constant_plans(plans: pd.DataFrame, weights: np.ndarray) -> pd.DataFrame:
-    """At each of the weights (k, m) the constant plan with the highest mean scalarised return, as an evaluation.
+def best_constant_plans(plans: pd.DataFrame, weights: np.ndarray, utility: Utility = LINEAR) -> pd.DataFrame:
+    """At each of the weights (k, m) the constant plan with the highest mean utility, as an evaluation.
 
     The best is chosen on the very episodes that it is reported on, which flatters it a little.
     """
     constant = plans[plans.plan.str.isdigit()]
-    means = constant.groupby("plan")[return_columns(objectives_of(plans.columns))].mean()
-    best = [means.index[int(scalarize(means.to_numpy(), one).argmax())] for one in weights]
-    tables = [at_weights(plans[plans.plan == plan], [one]) for plan, one in zip(best, weights, strict=True)]
+    names, returns = zip(*((plan, returns_of(rows)) for plan, rows in constant.groupby("plan")), strict=True)
+    best = [names[int(np.argmax([utility(values, one).mean() for values in returns]))] for one in weights]
+    tables = [at_weights(plans[plans.plan == plan], [one], utility) for plan, one in zip(best, weights, strict=True)]
     return pd.concat(tables, ignore_index=True)
 
 
@@ -84,8 +86,8 @@ def score(gained: pd.DataFrame, best: pd.DataFrame) -> float:
     ours, theirs = (np.unique(weights_of(table), axis=0) for table in (gained, best))
     if not np.array_equal(ours, theirs):
         raise ValueError("score: policy and constant plans have to be evaluated at the same weights")
-    whole = mean_scalarized(best)
-    return 100 * mean_scalarized(gained) / whole if whole > 0 else np.nan
+    whole = best.scalarized_return.mean()
+    return 100 * gained.scalarized_return.mean() / whole if whole > 0 else np.nan
 
 
 def front(gained: pd.DataFrame) -> np.ndarray:
@@ -114,6 +116,7 @@ class Comparison:
 
     evaluation: pd.DataFrame
     plans: pd.DataFrame
+    utility: Utility = LINEAR
 
     @cached_property
     def weights(self) -> np.ndarray:
@@ -125,9 +128,9 @@ class Comparison:
         """Gains by name: each policy of the evaluation, `plus_100`, `best`."""
         zero = self.plans[self.plans.plan == NOTHING]
         tables = dict(tuple(self.evaluation.groupby("policy")))
-        tables["plus_100"] = at_weights(self.plans[self.plans.plan == PLUS_100], self.weights)
-        tables["best"] = best_constant_plans(self.plans, self.weights)
-        return {name: gains(table, zero) for name, table in tables.items()}
+        tables["plus_100"] = at_weights(self.plans[self.plans.plan == PLUS_100], self.weights, self.utility)
+        tables["best"] = best_constant_plans(self.plans, self.weights, self.utility)
+        return {name: gains(table, zero, self.utility) for name, table in tables.items()}
 
     @cached_property
     def by_weight(self) -> pd.DataFrame:

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from cleanrl_style.protocol import fronts
+from cleanrl_style.protocol.course import Course, gain_columns
 from cleanrl_style.protocol.evaluation import POLICIES, PRIMARY
 from cleanrl_style.protocol.reference import NOTHING, title
 from cleanrl_style.protocol.score import Comparison, at_weights, by_weight, change, gain_hypervolume, gains
@@ -59,7 +60,8 @@ def print_score(objectives, comparison: Comparison) -> None:
     scores = {name: f"{comparison.score(name):.0f}" for name in shown}
     policies = ", ".join(f"{scores[policy]} {policy}" for policy in sorted(POLICIES, key=lambda name: name != PRIMARY))
     print(f"\nSCORE {policies}: 0 is to do nothing, 100 the best that one can do without looking")
-    print(f"\nGain: reward of an episode above that of doing nothing, mean of {episodes} evaluation episodes")
+    what = "reward" if comparison.utility.ideal is None else "Chebyshev's utility"
+    print(f"\nGain: {what} of an episode above that of doing nothing, mean of {episodes} evaluation episodes")
     whose = objectives[0] if len(objectives) == 2 else ""
     if len(objectives) > 2:
         print(f"weights of {', '.join(objectives)}")
@@ -83,6 +85,18 @@ def print_score(objectives, comparison: Comparison) -> None:
     )
 
 
+def print_course(course: Course, table: pd.DataFrame) -> None:
+    """The score in the course of the training; table : validation.csv, empty of a script that does not play it."""
+    if table.empty:
+        return
+    scores = [f"{course.score(rows):.0f}" for _, rows in table.groupby("global_step")]
+    shares = [f"{100 * step / course.steps:.0f}" for step in table.global_step.unique()]
+    print(
+        f"Course: score {', '.join(scores)} on {len(course.seeds)} validation sites after {', '.join(shares)} % of the "
+        "training (greedy)"
+    )
+
+
 def followed(objectives, comparison: Comparison) -> str:
     """How far the primary policy follows the preference, and how far the best constant plans do."""
     first, last = comparison.weights[[0, -1], 0]
@@ -101,18 +115,23 @@ def draw_summary(
     objectives,
     evaluation: pd.DataFrame,
     years: pd.DataFrame | None,
-    episodes: Path,
+    folder: Path,
     comparison: Comparison | None,
+    course: Course | None,
 ):
     """PNG of the learning curves and of the evaluation; of a fixed strategy, its stand's years instead of the curves.
 
-    comparison : with what one can do without looking; None where that is not known.
+    comparison, course : with what one can do without looking; None where that is not known.
     """
     from matplotlib.figure import Figure
 
-    learns = episodes.exists()
+    learns = (folder / "episodes.csv").exists()
+    played = pd.DataFrame() if course is None else pd.read_csv(folder / "validation.csv")
     draws = [_draw_gains] if comparison is not None else []
     draws += [_draw_trade_off if len(objectives) == 2 else _draw_parallel] if learns else [_draw_episodes]
+    points = evaluation
+    if learns and comparison is not None:  # what these two draw are gains then
+        points = pd.concat([comparison.gains[name].assign(policy=name) for name in (*POLICIES, "best")])
     used = (len(objectives) + 1 if learns else 3) + len(draws)
     rows = math.ceil(used / 2)
     figure = Figure(figsize=(10, 3.5 * rows), layout="constrained")
@@ -123,12 +142,14 @@ def draw_summary(
     )
     figure.suptitle(name + scores)
     axes = figure.subplots(rows, 2).ravel()
-    if learns:
-        _draw_learning(axes, objectives, pd.read_csv(episodes))
+    if len(played):
+        _draw_course(axes, objectives, course, played)
+    elif learns:
+        _draw_learning(axes, objectives, pd.read_csv(folder / "episodes.csv"))
     else:
         _draw_years(axes, of_last_weights(years, objectives))
     for ax, draw in zip(axes[used - len(draws) :], draws, strict=False):
-        draw(figure, ax, objectives, evaluation if draw is not _draw_gains else comparison)
+        draw(figure, ax, objectives, points if draw is not _draw_gains else comparison)
     for ax in axes[used:]:
         ax.set_axis_off()
     figure.savefig(file, format="png", dpi=120)
@@ -143,8 +164,8 @@ def of_last_weights(table: pd.DataFrame, objectives) -> pd.DataFrame:
 
 def _draw_gains(figure, ax, objectives, comparison: Comparison) -> None:
     """Scalarised gains by weight, beside those of what does not look."""
-    table = comparison.by_weight
-    x = table.index if len(objectives) == 2 else np.arange(len(table))
+    means = comparison.by_weight
+    x = means.index if len(objectives) == 2 else np.arange(len(means))
     styles = {
         "best": ("k:", "best constant plan of each weight (100)"),
         "plus_100": ("k--", "100 stems a year"),
@@ -152,11 +173,12 @@ def _draw_gains(figure, ax, objectives, comparison: Comparison) -> None:
         "sampled": ("^-", "sampled policy"),
     }
     for name, (style, label) in styles.items():
-        ax.plot(x, table[name], style, markersize=5, label=label)
+        ax.plot(x, means[name], style, markersize=5, label=label)
     zero = comparison.plans[comparison.plans.plan == NOTHING]
     for plan, rows in comparison.plans.groupby("plan"):
         if not plan.isdigit():  # a fixed strategy, of the evaluation that ships
-            gained = by_weight(gains(at_weights(rows, comparison.weights), zero)).scalarized_return.mean()
+            table = at_weights(rows, comparison.weights, comparison.utility)
+            gained = by_weight(gains(table, zero, comparison.utility)).scalarized_return.mean()
             ax.plot(x, gained, "--", color="0.7", linewidth=0.8, label=plan.replace("_", " "))
     ax.axhline(0, color="black", linewidth=0.8)
     ax.annotate("doing nothing (0)", (0.02, 0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8)
@@ -165,7 +187,34 @@ def _draw_gains(figure, ax, objectives, comparison: Comparison) -> None:
     ax.legend(fontsize=7)
 
 
+def _draw_course(axes, objectives, course: Course, table: pd.DataFrame) -> None:
+    """Gains on the validation sites: scalarised in the mean of the weights, and of each objective by weight."""
+    weights, marks = fronts.weight_columns(objectives), course.marks
+    steps = table.global_step.unique()
+    ax, *others = axes[: len(objectives) + 1]
+    ax.plot(steps, table.groupby("global_step").scalarized_gain.mean(), "o-", markersize=5, label="greedy policy")
+    lines = (("best", ":", "best constant plan of each weight (100)"), ("plus_100", "--", "100 stems a year"))
+    for name, style, label in lines:
+        ax.axhline(marks[name].scalarized_gain.mean(), linestyle=style, color="black", label=label)
+    ax.set(ylabel="scalarized gain", title=f"training, gain over doing nothing on {len(course.seeds)} validation sites")
+    for one, column in zip(others, gain_columns(objectives), strict=False):
+        for k, (key, rows) in enumerate(table.groupby(weights)):
+            label, colour = f"{objectives[0]} weight " if len(key) == 1 else "weights ", f"C{k}"
+            label += " ".join(f"{weight:.2g}" for weight in key)
+            one.plot(steps, rows[column], "o-", markersize=4, color=colour, label=label)
+            one.axhline(marks["best"][column][k], linestyle=":", color=colour)
+        one.axhline(marks["plus_100"][column][0], linestyle="--", color="black")
+        one.set(ylabel=column.replace("_", " "))
+    for one in (ax, *others):
+        one.axhline(0, color="black", linewidth=0.8)
+        one.annotate("doing nothing", (0.02, 0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8)
+        one.set(xlabel="environment steps", xlim=(0, None))
+        one.locator_params(axis="x", nbins=5)
+        one.legend(fontsize=7)
+
+
 def _draw_learning(axes, objectives, episodes: pd.DataFrame) -> None:
+    """Returns of the training's episodes, of an environment where what doing nothing returns is not known."""
     columns = [*fronts.return_columns(objectives), "scalarized_return"]
     colours = [COLOURS[k % len(COLOURS)] for k in range(len(objectives))] + ["black"]
     for ax, column, colour in zip(axes, columns, colours, strict=False):
@@ -191,8 +240,13 @@ def _draw_years(axes, years: pd.DataFrame) -> None:
         ax.legend(fontsize=8)
 
 
+def what_is_shown(table: pd.DataFrame) -> str:
+    """Returns, or gains if the table has the best constant plans' too."""
+    return "gain" if (table.policy == "best").any() else "return"
+
+
 def _draw_trade_off(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
-    first, second = objectives
+    (first, second), what = objectives, what_is_shown(evaluation)
     returns = fronts.return_columns((second, first))
     for policy, marker in (("sampled", "o"), ("greedy", "^")):
         means = evaluation[evaluation.policy == policy].groupby("preference")[returns].mean()
@@ -209,7 +263,11 @@ def _draw_trade_off(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
         ax.plot([], [], marker, color="white", markeredgecolor="black", label=f"{policy} policy")
         for weight in (means.index[0], means.index[-1]):
             ax.annotate(f"{weight:g}", means.loc[weight], xytext=(5, 5), textcoords="offset points", fontsize=8)
-    ax.set(xlabel=f"mean {second} return", ylabel=f"mean {first} return", title="evaluation, one point per weight")
+    if what == "gain":
+        best = evaluation[evaluation.policy == "best"].groupby("preference")[returns].mean()
+        ax.plot(best[returns[0]], best[returns[1]], "kx:", markersize=5, linewidth=0.8, label="best constant plans")
+        ax.plot(0, 0, "k+", markersize=9, label="doing nothing")
+    ax.set(xlabel=f"mean {second} {what}", ylabel=f"mean {first} {what}", title="evaluation, one point per weight")
     ax.locator_params(nbins=6)
     ax.ticklabel_format(useOffset=False)
     ax.legend(fontsize=8)
@@ -226,7 +284,7 @@ def _draw_parallel(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
     for k, name in enumerate(objectives):
         ax.plot([], [], "o-", color=COLOURS[k % len(COLOURS)], label=f"{name} weighs most")
     ax.set_xticks(range(len(objectives)), objectives)
-    ax.set(ylabel="mean return", title=f"evaluation, {PRIMARY} policy, one line per weight")
+    ax.set(ylabel=f"mean {what_is_shown(evaluation)}", title=f"evaluation, {PRIMARY} policy, one line per weight")
     ax.legend(fontsize=8)
 
 

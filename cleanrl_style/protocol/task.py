@@ -9,7 +9,8 @@ import numpy as np
 from gymnasium.wrappers import OrderEnforcing
 
 import boreal_env
-from cleanrl_style.protocol.fronts import return_columns, scalarize, weight_columns
+from cleanrl_style.protocol.fronts import return_columns, weight_columns
+from cleanrl_style.protocol.utility import LINEAR, Utility
 from sim.task.preference import check_weights
 from sim.task.shifts import SHIFTS, shifts_of
 
@@ -36,6 +37,7 @@ class Task:
     site_entries: tuple[int, ...] = ()  # entries of the observation that are site parameters
     observes_preference: bool = True  # at the front of the observation, all weights but the last
     preference: np.ndarray | None = field(default=None, compare=False)  # of every training episode; None: drawn
+    utility: Utility = LINEAR  # of an episode's return
 
     @staticmethod
     def of(env_id: str, **env_kwargs) -> "Task":
@@ -61,7 +63,7 @@ class Task:
             task = replace(
                 task,
                 boreal=True,
-                mode=one.mode.replace("_", "-"),
+                mode=one.mode,
                 thaw_formulation=one.thaw_formulation,
                 years=one.years,
                 draws_sites=draws_sites,
@@ -101,9 +103,9 @@ class Task:
         return dict(zip(weight_columns(self.objectives), weights, strict=self.num_objectives != 2))
 
     def returns_row(self, weights: np.ndarray, returns: np.ndarray) -> dict:
-        """A table's columns of weights (m,), returns (m,) and scalarised return."""
+        """A table's columns of weights (m,), returns (m,) and scalarised return, which is their utility."""
         columns = dict(zip(return_columns(self.objectives), returns, strict=True))
-        return {**self.weights_row(weights), **columns, "scalarized_return": scalarize(returns, weights)}
+        return {**self.weights_row(weights), **columns, "scalarized_return": self.utility(returns, weights)}
 
     def check_weights(self, value) -> np.ndarray:
         """Weights (m,) of a preference as flags give it; ValueError names what is allowed."""

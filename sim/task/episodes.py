@@ -26,7 +26,7 @@ from sim.task.observation import Moment, Table, observation_rows
 from sim.task.preference import check_weights, draw_weights, shown
 from sim.task.timber import TIMBER_COLUMNS, Timber, check_discount_rate, countries
 
-MODES = ("generalist", "site_specific")
+MODES = ("generalist", "site-specific")
 
 #: The world of `boreal-balanced-v0`, as arguments of an environment or of `sim.Stands`.
 BALANCED_WORLD = {"boundary": "balanced", "soil_carbon": "balanced", "weather": "observed"}
@@ -65,6 +65,7 @@ class Episodes:
         scenario=None,
         observation_groups=None,
         record_years=False,
+        record_steps=False,
     ):
         check_name("mode", mode, MODES)
         check_name("thaw_formulation", thaw_formulation, THAW_FORMULATIONS)
@@ -72,7 +73,8 @@ class Episodes:
             raise ValueError(f"years: an integer in [1, 1000] is allowed, got {years!r}")
         if site_seed is not None:
             check_seed("site_seed", site_seed)
-        for name, value in (("balanced", balanced), ("record_years", record_years)):
+        switches = {"balanced": balanced, "record_years": record_years, "record_steps": record_steps}
+        for name, value in switches.items():
             if not isinstance(value, (bool, np.bool_)):
                 raise ValueError(f"{name}: True or False is allowed, got {value!r}")
         self.number, self.mode, self.years = number, mode, int(years)
@@ -106,7 +108,7 @@ class Episodes:
         self.reward_columns = [self.history_names.index(f"{name}_reward") for name in self.objective_names]
         limits = [(o.low, o.high) if isinstance(o, Objective) else (-1.0, 1.0) for o in objectives]
         self.reward_space = Box(*np.array(limits, dtype=np.float32).T, dtype=np.float32)
-        self.record_years = bool(record_years)
+        self.record_years, self.record_steps = bool(record_years), bool(record_steps)
         self.stands = sim.Stands(
             number,
             time_step_minutes=time_step_minutes,
@@ -127,7 +129,7 @@ class Episodes:
         self.masks = MaskFunction(self.table.names, harvest_min_class)
         rows = self.table.rows
         groups = check_groups(observation_groups, [row.group for row in rows])
-        if mode == "site_specific":
+        if mode == "site-specific":
             groups = tuple(group for group in groups if group != "site")
         self.entries = [i for i, row in enumerate(rows) if row.group in groups]
         if not self.entries:
@@ -144,6 +146,7 @@ class Episodes:
         self.running = np.zeros(number, dtype=bool)
         self.history = np.zeros((number, self.years, len(self.history_names)))
         self.observed = np.zeros((number, len(rows)))  # values of all rows, in their units
+        self.last_year = np.zeros((number, len(self.history_names)))
 
     def draw(self, generator: np.random.Generator) -> tuple[int, int, np.ndarray]:
         """Site seed, episode seed and preference of an episode: always as many draws."""
@@ -156,14 +159,14 @@ class Episodes:
         for k, i in enumerate(indices):
             site_seed, episode_seed, weights = draws[k]
             overrides = {**self.parameter_overrides, **(sites[k] or {})}
-            if self.mode == "site_specific":
+            if self.mode == "site-specific":
                 # A fixed world: one site, one start, one weather, one set of disturbance dice.
                 overrides.setdefault("daily_noise_std_c", 0.0)
                 episode_seed = 0 if self.site_seed is None else self.site_seed
                 given[k] = middle_stocks({**sim.INITIAL_RANGES, **self.initial_ranges})
             if self.site_seed is not None:
                 site_seed = self.site_seed
-            fixed_middle = self.mode == "site_specific" and self.site_seed is None
+            fixed_middle = self.mode == "site-specific" and self.site_seed is None
             chosen.append(sim.middle_site(overrides) if fixed_middle else sim.sample_site(site_seed, overrides))
             seeds.append(sim.episode_seeds(episode_seed))
             self.site_seeds[i] = -1 if fixed_middle else site_seed
@@ -191,7 +194,7 @@ class Episodes:
             parts |= objective.columns(by_name | parts)
         added = np.array([parts[name] for name in self.history_names[record.shape[1] :]])
         year = np.concatenate([record, added.T], axis=1)
-        self.history[np.arange(self.number), self.year] = year
+        self.history[np.arange(self.number), self.year] = self.last_year = year
         self.year = self.year + 1
         self.running = self.year < self.years
         self.observed = self.values_of(np.arange(self.number), year, actions, self.observed)
@@ -231,6 +234,10 @@ class Episodes:
         fresh = ~self.running & (self.year == 0)
         if fresh.any():
             raise RuntimeError(f"{what} of episode {int(np.argmax(fresh))} that has not begun: call reset first")
+
+    def year_record(self) -> dict[str, np.ndarray]:
+        """The record of the year that was stepped last, each column (number,)."""
+        return {name: column.copy() for name, column in zip(self.history_names, self.last_year.T, strict=True)}
 
     def final_info(self, i: int) -> dict:
         """Totals of a finished episode."""

@@ -1,0 +1,128 @@
+"""Checks and scores a policy as the leaderboard does: on the published test sites of the default and the balanced task.
+
+    python analysis/score_policy.py runs/ppo_group/boreal-balanced-v0-vectorization=lockstep/seed1
+    python analysis/score_policy.py their_policy.pt --script their_method.py --name "Their method" --add
+
+A run's folder is checked first: its policy has to play the evaluation that lies beside it. --add puts the row into
+docs/leaderboard.csv, in place of the row of that name, and the table into docs/leaderboard.md.
+"""
+
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import tyro
+
+from analysis.excerpts import markdown
+from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts, reference, score
+from cleanrl_style.protocol.summary import followed
+
+TASKS = ("boreal-generalist-v0", "boreal-balanced-v0")
+SCORES = tuple(f"{policy}, {task}" for task in TASKS for policy in protocol.POLICIES)
+COLUMNS = ("name", "script", "trained on", "steps", *SCORES)
+PAGE, TABLE = Path("docs", "leaderboard.md"), Path("docs", "leaderboard.csv")
+SECTION = re.compile(r"(<!-- leaderboard -->\n).*?(<!-- end of leaderboard -->)", re.DOTALL)
+CHECKED = 8  # episodes a weight that are played again
+
+
+@dataclass
+class Args:
+    """Checks and scores a policy on the published test sites."""
+
+    policy: tyro.conf.Positional[Path]
+    """folder of a run, policy file, or name of a policy that ships"""
+    script: Path | None = None
+    """the script that trained it, if that does not lie in cleanrl_style/"""
+    tasks: tuple[str, ...] = TASKS
+    """environments to score it on"""
+    episodes: int = 200
+    """the first of the test sites; a row of the leaderboard has all"""
+    name: str | None = None
+    """name of the row (None: the script's)"""
+    add: bool = False
+    """put the row into the leaderboard"""
+    root: Path = Path()
+    """folder of docs/"""
+
+
+def check(policy: protocol.Policy, folder: Path) -> str:
+    """Play the beginning of a run's evaluation again; ValueError if it went otherwise."""
+    if not (folder / "evaluation.csv").is_file():
+        return "a policy file alone: nothing to check it against"
+    written = pd.read_csv(folder / "evaluation.csv")
+    written = written[written.episode < CHECKED].reset_index(drop=True)
+    weights = np.unique(fronts.weights_of(written), axis=0)
+    again, _ = protocol.evaluate(policy.task(), policy.probabilities, weights, int(written.episode.max()) + 1)
+    objectives = fronts.objectives_of(written.columns)
+    key = ["policy", *fronts.weight_columns(objectives), "seed"]
+    first, second = (table.sort_values(key)[fronts.return_columns(objectives)] for table in (written, again))
+    if first.shape != second.shape or not np.allclose(first, second, atol=1e-4):
+        raise ValueError(f"{folder}: its policy does not play what evaluation.csv says (of another physics?)")
+    return f"plays its evaluation again, {len(again)} episodes"
+
+
+def comparison(policy: protocol.Policy, env_id: str, episodes: int) -> score.Comparison:
+    """A policy's evaluation in an environment, beside the constant plans there."""
+    observation_groups = policy.task().env_kwargs.get("observation_groups")
+    kwargs = {} if observation_groups is None else {"observation_groups": observation_groups}
+    task = protocol.Task.of(env_id, **kwargs)
+    size = task.make().observation_space.shape[0]
+    if size != policy.size:
+        raise ValueError(f"{policy.name} observes {policy.size} entries, {env_id} has {size}: --tasks names others")
+    weights = fronts.evaluation_weights(task.num_objectives)
+    evaluation, _ = protocol.evaluate(task, policy.probabilities, weights, episodes)
+    plans = reference.reference_returns(task, evaluation.seed.drop_duplicates().tolist())
+    return score.Comparison(evaluation, plans)
+
+
+def add(row: dict, root: Path) -> None:
+    """Put a row into the leaderboard's table and page, the best on the balanced task first."""
+    table = pd.DataFrame([row], columns=COLUMNS)
+    if (root / TABLE).exists():
+        there = pd.read_csv(root / TABLE)
+        table = pd.concat([there[there.name != row["name"]], table], ignore_index=True)
+    table = table.sort_values([f"greedy, {TASKS[1]}", "name"], ascending=[False, True])
+    page = (root / PAGE).read_text(encoding="utf-8")
+    cells = [[f"{v:.0f}" if isinstance(v, float) else str(v) for v in line] for line in table.itertuples(index=False)]
+    text, count = SECTION.subn(lambda match: match[1] + markdown(COLUMNS, cells) + match[2], page)
+    if not count:
+        raise ValueError(f"{root / PAGE}: no <!-- leaderboard --> to <!-- end of leaderboard -->")
+    with protocol.replacing(root / TABLE) as file:
+        table.to_csv(file, index=False, float_format="%.4g", lineterminator="\n")
+    with protocol.replacing(root / PAGE) as file:
+        file.write(text.encode())
+
+
+def main(args: Args) -> None:
+    """Check, score, and add."""
+    try:
+        if args.add and (set(args.tasks) != set(TASKS) or args.episodes != 200):
+            raise ValueError("--add: a row of the leaderboard is of both tasks and all 200 test sites")
+        policy = protocol.load_policy(args.policy, args.script)
+        print(f"{policy.name}: {policy.script}, {check(policy, args.policy)}")
+        row = {
+            "name": args.name or policy.script,
+            "script": policy.script,
+            "trained on": policy.env_id,
+            "steps": policy.arguments.get("total_timesteps"),
+        }
+        for env_id in args.tasks:
+            one = comparison(policy, env_id, args.episodes)
+            row |= {f"{kind}, {env_id}": one.score(kind) for kind in protocol.POLICIES}
+            scores = ", ".join(f"{one.score(kind):.0f} {kind}" for kind in protocol.POLICIES)
+            gain, best = one.by_weight["greedy"].mean(), one.by_weight["best"].mean()
+            print(f"{env_id}: SCORE {scores}; mean gain {gain:.2f} (best constant plans {best:.2f})")
+            print(followed(protocol.Task.of(env_id).objectives, one))
+        if args.add:
+            add(row, args.root)
+            print(f"wrote {args.root / TABLE} and {args.root / PAGE}")
+    except (ValueError, OSError) as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

@@ -1,0 +1,64 @@
+"""Ships trained policies with the package, so that `load_policy` and `python -m boreal_env watch` know them by name.
+
+    python analysis/ship_policies.py runs/ppo_group/boreal-balanced-v0-vectorization=lockstep/seed1 ..
+
+A policy is named as its script, with -<task> behind it where that is not boreal-generalist-v0: ppo_group,
+ppo_group-balanced. Writes cleanrl_style/policies/<name>.pt, without the critic, at most 100 kB each.
+"""
+
+import io
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+import tyro
+
+from cleanrl_style import protocol
+from cleanrl_style.protocol import agents
+
+LARGEST = 100_000  # bytes
+
+
+@dataclass
+class Args:
+    """Ships the policies of runs, in place of those of the same names."""
+
+    runs: tyro.conf.Positional[tuple[Path, ...]]
+    """folders of finished runs, or their policy.pt"""
+    folder: Path = Path("cleanrl_style", agents.FOLDER)
+    """folder of the policies that ship"""
+
+
+def name_of(run: dict) -> str:
+    """A policy's name, of its run's script and arguments."""
+    task = run["arguments"]["env_id"].removeprefix("boreal-").removesuffix("-v0")
+    return run["script"] + ("" if task == "generalist" else f"-{task}")
+
+
+def main(args: Args) -> None:
+    """Ship the policies; nothing is written unless all can be."""
+    packed = {}
+    for path in args.runs:
+        try:
+            protocol.load_policy(path)
+        except (FileNotFoundError, ValueError) as error:
+            sys.exit(f"error: {error}")
+        saved = torch.load(path / agents.FILE if path.is_dir() else path, weights_only=True)
+        saved["agent"] = {key: value for key, value in saved["agent"].items() if not key.startswith("critic.")}
+        buffer, name = io.BytesIO(), name_of(saved["run"])
+        torch.save(saved, buffer)
+        if len(buffer.getvalue()) > LARGEST:
+            sys.exit(f"error: {path}: {len(buffer.getvalue())} bytes, at most {LARGEST} are allowed")
+        if name in packed:
+            sys.exit(f"error: {path}: two policies of the name {name}")
+        packed[name] = buffer.getvalue()
+    args.folder.mkdir(parents=True, exist_ok=True)
+    for name, content in packed.items():
+        with protocol.replacing(args.folder / f"{name}.pt") as file:
+            file.write(content)
+        print(f"wrote {args.folder / name}.pt: {len(content)} bytes")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

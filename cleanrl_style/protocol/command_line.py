@@ -1,0 +1,175 @@
+"""`python -m boreal_env`: what there is, and fifty years of a trained policy to watch.
+
+python -m boreal_env
+python -m boreal_env watch ppo_group --preference 0.3 --site-seed 7
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+
+import boreal_env
+from cleanrl_style.protocol.agents import Policy, load_policy, shipped_policies
+from cleanrl_style.protocol.arguments import fail
+from cleanrl_style.protocol.compilation import compile_physics
+from cleanrl_style.protocol.files import replacing
+from cleanrl_style.protocol.task import as_option
+from sim.parameters import check_seed
+from sim.task.preference import check_weights
+
+ENVIRONMENTS = {
+    "boreal-balanced-v0": "the task to study policies with",
+    "boreal-generalist-v0": "the paper's: a new site in every episode",
+    "boreal-site-specific-v0": "the paper's: one fixed site",
+    "boreal-timber-v0": "the balanced task with a third objective, timber",
+    "boreal-four-v0": "and with a fourth, biodiversity",
+    "boreal-warming-v0": "the balanced task under the scenario SSP2-4.5",
+}
+FRAME_MS, LAST_FRAME_MS = 200, 3000
+FRAME_SIZE = (640, 400)  # pixels
+
+
+def overview() -> str:
+    """What there is."""
+    width = max(map(len, ENVIRONMENTS))
+    return "\n".join(
+        [
+            "BoreaRL: manage a boreal stand for fifty years, for its carbon and for the permafrost below it.",
+            "",
+            "Environments, for gymnasium.make after `import boreal_env`:",
+            *(f"  {name:{width}}  {words}" for name, words in ENVIRONMENTS.items()),
+            "",
+            "Train, in a checkout of the project (--help has the flags and a trial of a minute):",
+            "  python cleanrl_style/ppo_group.py --vectorization lockstep --env-id boreal-balanced-v0",
+            "",
+            "Watch fifty years of a trained policy:",
+            "  python -m boreal_env watch POLICY --preference 0.3 --site-seed 7",
+            f"where POLICY is the folder of a run, its policy.pt or one that ships: "
+            f"{', '.join(shipped_policies()) or 'none does yet'}.",
+        ]
+    )
+
+
+def arguments(argv: list[str]) -> argparse.Namespace:
+    """The command line; a bad one ends the command with one line."""
+
+    class Parser(argparse.ArgumentParser):
+        def error(self, message):
+            fail(message)
+
+    parser = Parser(prog="python -m boreal_env", description=overview(), formatter_class=argparse.RawTextHelpFormatter)
+    commands = parser.add_subparsers(dest="command", metavar="watch")
+    watch = commands.add_parser("watch", help="fifty years of a trained policy, as an animated GIF or in a window")
+    watch.add_argument("policy", help="folder of a run, policy file, or name of a policy that ships")
+    watch.add_argument("--preference", type=float, nargs="+", help="carbon weight, or one weight an objective")
+    watch.add_argument("--site-seed", type=int, help="the site, as sim.sample_site(seed) draws it (the seed's own)")
+    watch.add_argument("--seed", type=int, default=0, help="of weather, first stand and dice (0)")
+    watch.add_argument("--env-id", help="another environment than the policy was trained on")
+    watch.add_argument("--sampled", action="store_true", help="draw actions instead of the most probable ones")
+    watch.add_argument("--window", action="store_true", help="show it in a window, instead of writing a GIF")
+    watch.add_argument("--out", type=Path, help="the GIF (<policy>-site<seed>.gif)")
+    return parser.parse_args(argv)
+
+
+def make_env(policy: Policy, env_id: str | None, site_seed: int | None) -> gym.Env:
+    """The environment to watch a policy in: that of its training, or another with the same observation."""
+    kwargs = {} if site_seed is None else {"site_seed": check_seed("--site-seed", site_seed)}
+    if env_id is None:
+        env = policy.task().make(render_mode="rgb_array", **kwargs)
+    else:
+        env = gym.make(env_id, render_mode="rgb_array", **kwargs)
+    if env.observation_space.shape != (policy.size,):
+        raise ValueError(
+            f"{policy.name} observes {policy.size} entries, {env.spec.id} has {env.observation_space.shape[0]}: "
+            f"--env-id {policy.env_id} is what it was trained on"
+        )
+    return env
+
+
+def play(env: gym.Env, policy, seed: int, weights: np.ndarray):
+    """An episode: its frames, one at the start and one a year, and its returns (m,).
+
+    policy : a function of the observation, the mask and the returns so far.
+    """
+    observation, _ = env.reset(seed=seed, options={"preference": as_option(weights)})
+    frames, returns, ended = [env.render()], np.zeros(len(weights)), False
+    while not ended:
+        action = policy(observation, env.unwrapped.action_masks(), returns)
+        observation, reward, terminated, truncated, _ = env.step(action)
+        returns, ended = returns + reward, terminated or truncated
+        frames.append(env.render())
+    return frames, returns
+
+
+def save_animation(path: Path, frames: list[np.ndarray]) -> None:
+    """An animated GIF that stays on its last picture for a while; the colours are those of its first and last."""
+    from PIL import Image
+
+    pictures = [Image.fromarray(frame).resize(FRAME_SIZE, Image.Resampling.LANCZOS) for frame in frames]
+    colours = Image.fromarray(np.concatenate([pictures[0], pictures[-1]])).quantize(256)
+    indexed = [picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures]
+    durations = [FRAME_MS] * (len(indexed) - 1) + [LAST_FRAME_MS]
+    options = {"save_all": True, "append_images": indexed[1:], "duration": durations, "loop": 0}
+    with replacing(path) as file:
+        indexed[0].save(file, format="gif", **options, optimize=True)
+
+
+def show(frames: list[np.ndarray]) -> None:
+    """The frames in a window, until it is closed."""
+    import matplotlib.pyplot as plt
+
+    figure, ax = plt.subplots(figsize=(8, 5), num="BoreaRL")
+    if plt.get_backend().lower() == "agg":
+        raise ValueError("--window: matplotlib finds no display here; without it a GIF is written")
+    figure.subplots_adjust(0, 0, 1, 1)
+    ax.set_axis_off()
+    picture = ax.imshow(frames[0])
+    for frame in frames:
+        if plt.fignum_exists(figure.number):
+            picture.set_data(frame)
+            plt.pause(FRAME_MS / 1000)
+    plt.show()
+
+
+def watch(args: argparse.Namespace) -> None:
+    """Play the policy, say what it returned beside doing nothing, and show its years."""
+    policy = load_policy(args.policy)
+    env = make_env(policy, args.env_id, args.site_seed)
+    names = env.unwrapped.objective_names
+    given = args.preference or [1 / len(names)] * len(names)
+    weights = check_weights(given[0] if len(given) == 1 else given, len(names), "--preference")
+    generator = np.random.default_rng([args.seed, 1]) if args.sampled else None
+    compile_physics([1])
+    seed = check_seed("--seed", args.seed)
+    frames, returns = play(env, lambda *given: policy.act(*given, generator=generator), seed, weights)
+    env.unwrapped.render_mode = None
+    _, nothing = play(env, lambda *given: boreal_env.NO_CHANGE, seed, weights)
+    for name, weight, one, other in zip(names, weights, returns, nothing, strict=True):
+        print(f"{name:>12} weight {weight:.2f}: return {one:+.2f}, doing nothing {other:+.2f}, gain {one - other:+.2f}")
+    print(f"{'scalarised':>12} gain {weights @ (returns - nothing):+.2f}")
+    if args.window:
+        show(frames)
+        return
+    site = f"seed{seed}" if args.site_seed is None else f"site{args.site_seed}"
+    path = args.out or Path(f"{policy.script}-{site}.gif")
+    save_animation(path, frames)
+    print(f"wrote {path}: {len(frames) - 1} years")
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Run the command."""
+    args = arguments(sys.argv[1:] if argv is None else argv)
+    if args.command is None:
+        print(overview())
+        return
+    try:
+        watch(args)
+    except (ValueError, OSError, gym.error.Error, ImportError) as error:
+        fail(str(error).splitlines()[0])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,126 @@
+"""`python -m boreal_env`, policies by name, and the commands that ship and score them."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+from scripts import ROOT, run_script
+
+import boreal_env
+from analysis import score_policy, ship_policies
+from cleanrl_style import protocol
+from cleanrl_style.protocol import agents, command_line
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A short run on the fixed site."""
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    run_script(
+        "cleanrl_style/ppo_gated.py",
+        *("--env-id", "boreal-site-specific-v0", "--vectorization", "lockstep", "--num-envs", 4, "--update-epochs", 1),
+        *("--rollout-steps", 200, "--total-timesteps", 200, "--eval-episodes", 1, "--run-dir", folder),
+    )
+    return folder
+
+
+@pytest.fixture
+def shipped(run, tmp_path, monkeypatch):
+    """That run's policy, shipped."""
+    monkeypatch.setattr(agents, "files", lambda package: tmp_path)
+    ship_policies.main(ship_policies.Args((run,), tmp_path / agents.FOLDER))
+    return "ppo_gated-site-specific"
+
+
+def test_the_module_says_what_there_is():
+    command = [sys.executable, "-W", "error::UserWarning", "-m", "boreal_env"]
+    out = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    assert all(name in out for name in boreal_env.REGISTERED) and "watch" in out
+    assert set(command_line.ENVIRONMENTS) == set(boreal_env.REGISTERED)
+
+
+def test_a_policy_ships_small_and_is_loaded_by_name(shipped, run, tmp_path):
+    path = tmp_path / agents.FOLDER / f"{shipped}.pt"
+    assert path.stat().st_size <= ship_policies.LARGEST < (run / "policy.pt").stat().st_size + 50_000
+    by_name, by_folder, by_file = (protocol.load_policy(name) for name in (shipped, run, run / "policy.pt"))
+    observations = np.random.default_rng(0).random((5, 43), dtype=np.float32)
+    masks = np.ones((5, 25), bool)
+    for policy in (by_folder, by_file):
+        expected = policy.probabilities(observations, masks, np.zeros((5, 2)))
+        np.testing.assert_array_equal(by_name.probabilities(observations, masks, np.zeros((5, 2))), expected)
+    assert by_name.env_id == "boreal-site-specific-v0" and by_name.task().mode == "site-specific"
+
+
+def test_a_policy_acts(run):
+    policy = protocol.load_policy(run)
+    env = policy.task().make()
+    observation, _ = env.reset(seed=1)
+    mask = env.unwrapped.action_masks()
+    action = policy.act(observation, mask)
+    assert isinstance(action, int) and mask[action]
+    assert policy.act(np.stack([observation] * 3), np.stack([mask] * 3)).tolist() == [action] * 3
+    drawn = {policy.act(observation, mask, generator=np.random.default_rng(k)) for k in range(20)}
+    assert len(drawn) > 3
+    with pytest.raises(ValueError, match=r"observations \(n, 43\) and masks \(n, 25\) are allowed, got \(1, 3\)"):
+        policy.act(np.zeros(3), mask)
+
+
+def test_a_policy_is_watched(shipped, tmp_path, capsys, monkeypatch):
+    path, make = tmp_path / "years.gif", protocol.Task.make
+    monkeypatch.setattr(protocol.Task, "make", lambda task, **kwargs: make(task, years=4, **kwargs))
+    command_line.main(["watch", shipped, "--preference", "0.3", "--site-seed", "7", "--out", str(path)])
+    with Image.open(path) as animation:
+        assert animation.n_frames == 5 and animation.size == command_line.FRAME_SIZE
+    out = capsys.readouterr().out
+    assert "carbon weight 0.30: return" in out and "doing nothing" in out and ": 4 years" in out
+
+
+@pytest.mark.parametrize(
+    "given, message",
+    [
+        (["watch", "nobody"], "nobody: neither the folder of a finished run"),
+        (["watch", "{run}", "--preference", "2"], r"--preference: a number in \[0, 1\] is allowed, got 2.0"),
+        (["watch", "{run}", "--env-id", "boreal-balanced-v0"], "observes 43 entries, boreal-balanced-v0 has 105"),
+        (["watch", "{run}", "--env-id", "boral-v0"], "boral"),
+        (["wach"], "invalid choice: 'wach'"),
+    ],
+)
+def test_a_bad_command_gets_one_line(run, given, message):
+    with pytest.raises(SystemExit, match=message) as refused:
+        command_line.main([word.format(run=run) for word in given])
+    assert "\n" not in str(refused.value)
+
+
+def test_a_run_is_checked_and_scored(run, capsys):
+    args = score_policy.Args(run, tasks=("boreal-site-specific-v0",), episodes=1)
+    score_policy.main(args)
+    out = capsys.readouterr().out
+    assert "plays its evaluation again" in out and "boreal-site-specific-v0: SCORE" in out
+
+
+def test_a_policy_that_does_not_play_its_evaluation_is_refused(run, tmp_path):
+    for name in ("config.json", "policy.pt"):
+        (tmp_path / name).write_bytes((run / name).read_bytes())
+    table = pd.read_csv(run / "evaluation.csv")
+    table.assign(thaw_return=table.thaw_return + 1).to_csv(tmp_path / "evaluation.csv", index=False)
+    with pytest.raises(SystemExit, match="does not play what evaluation.csv says"):
+        score_policy.main(score_policy.Args(tmp_path, tasks=("boreal-site-specific-v0",), episodes=1))
+    with pytest.raises(SystemExit, match="--add: a row of the leaderboard"):
+        score_policy.main(score_policy.Args(run, episodes=1, add=True))
+
+
+def test_rows_go_into_the_leaderboard(tmp_path):
+    (tmp_path / "docs").mkdir()
+    page = tmp_path / score_policy.PAGE
+    page.write_text("# Leaderboard\n<!-- leaderboard -->\n<!-- end of leaderboard -->\nend\n", encoding="utf-8")
+    scores = dict.fromkeys(score_policy.SCORES, 50.0)
+    for name, best in (("one", 60.0), ("two", 80.0), ("one", 90.0)):
+        row = {"name": name, "script": "ppo", "trained on": "boreal-balanced-v0", "steps": 300000}
+        score_policy.add({**row, **scores, f"greedy, {score_policy.TASKS[1]}": best}, tmp_path)
+    names = pd.read_csv(tmp_path / score_policy.TABLE).name.tolist()
+    assert names == ["one", "two"]
+    text = page.read_text(encoding="utf-8")
+    assert text.index("| one |") < text.index("| two |") and text.endswith("end\n") and "| 90 |" in text
