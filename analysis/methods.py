@@ -59,7 +59,7 @@ def scripts(*kinds: str) -> tuple[str, ...]:
 
 
 LEARNERS = scripts(CONDITIONED)
-TRAINED = scripts(CONDITIONED, FIXED_WEIGHT)
+TRAINED = scripts(CONDITIONED, FIXED_WEIGHT, OTHERS)
 STRATEGIES = scripts(HEURISTIC, CONTROL)
 OUTSIDE = scripts(OTHERS)
 

@@ -2,7 +2,7 @@
 
     python analysis/outside/envelope.py --seed 1 --env-id boreal-balanced-v0
 
-Settings are those of the library's example of discrete actions (minecart), gamma but one.
+Settings are those of the library's example of discrete actions (minecart), but gamma.
 """
 
 from dataclasses import dataclass

@@ -17,7 +17,7 @@ from analysis.outside.common import Args, Session, main
 
 @dataclass
 class MaskablePPOArgs(Args):
-    """MaskablePPO of sb3-contrib, an agent a weight, on a boreal environment: trains, evaluates, leaves a run folder."""
+    """MaskablePPO of sb3-contrib on a boreal environment, an agent a weight: trains, evaluates, leaves a run folder."""
 
     learning_rate: float = 3e-4
     """of Adam"""

@@ -6,7 +6,9 @@ import pandas as pd
 from analysis import metrics
 from analysis.experiments import GENERALIST
 from analysis.paper_claims.claim import (
+    CONTROL,
     LEAST,
+    LEVEL,
     QUARTER,
     UNDECIDED,
     Finding,
@@ -175,6 +177,7 @@ def constant_gains(evidence, weight: float) -> pd.Series:
     "agents of thaw alone gain what constant plans can, by the same physics. Over all sites a common mean is no "
     "such help, for it is the sites that differ (`docs/learning.md`).",
     note="The paper names delay and noise together; the noise of sites is judged below.",
+    kind=CONTROL,
 )
 def physics_hides_thaw(evidence):
     gains = {
@@ -218,6 +221,7 @@ def at_the_end(evidence, weight: float, column: str) -> pd.Series:
     FIXED,
     why="Density after fifty years is a balance of planting and self-thinning, whose strength is a property of the "
     "simulator; densities of two simulators need not agree.",
+    kind=LEVEL,
 )
 def carbon_density(evidence):
     density = seeds(at_the_end(evidence, CARBON, "final_density"))
@@ -229,6 +233,7 @@ def carbon_density(evidence):
     "Section 4.2, figure 2c",
     FIXED,
     why="Trees shelter the ground here and thin its snow, so an agent of thaw plants as well.",
+    kind=LEVEL,
 )
 def thaw_density(evidence):
     density = seeds(at_the_end(evidence, THAW, "final_density"))
