@@ -26,10 +26,8 @@ PAGES = (
     "docs/learning.md",
     "docs/performance.md",
     "docs/outside.md",
-    *(
-        f"docs/algorithms/{name}.md"
-        for name in (*methods.LEARNERS, *methods.scripts(methods.FIXED_WEIGHT), "heuristics")
-    ),
+    *(f"docs/algorithms/{name}.md" for name in methods.scripts(methods.CONDITIONED, methods.FIXED_WEIGHT)),
+    "docs/algorithms/heuristics.md",
 )
 SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
 ENDS = (0.0, 1.0)  # weights

@@ -207,7 +207,7 @@ def main(script: str, arguments: type, learn: Callable, samples: bool) -> None:
     tables = {"episodes": task.episode_columns, "cost": COST_COLUMNS}
     with protocol.Run(args, task, Path(script).stem, **tables) as run:
         random.seed(args.seed)
-        np.random.seed(args.seed)
+        np.random.seed(args.seed)  # noqa: NPY002, the libraries draw from it
         torch.manual_seed(args.seed)
         torch.set_num_threads(1)
         protocol.compile_physics([1])
