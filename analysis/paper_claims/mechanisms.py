@@ -159,7 +159,8 @@ def correlation(by_seed: pd.Series, sites: int) -> Number:
     if by_seed.dropna().empty:
         raise Missing("a run that has the number")
     mean = float(by_seed.mean())
-    low, high = (float(np.tanh(np.arctanh(mean) + side * 1.96 / np.sqrt(max(sites - 3, 1)))) for side in (-1, 1))
+    z, half_width = np.arctanh(np.clip(mean, -1 + 1e-9, 1 - 1e-9)), 1.96 / np.sqrt(max(sites - 3, 1))
+    low, high = (float(np.tanh(z + side * half_width)) for side in (-1, 1))
     return Number(mean, low, high, "sites", sites)
 
 

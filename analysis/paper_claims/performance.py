@@ -165,7 +165,7 @@ def restlessness(one) -> dict:
     """Standard deviation of the change between neighbouring parts of the second half of a run's training."""
     names = ("scalarized_return", "thaw_return")
     courses = {name: one.runs[0].course(name) for name in names}
-    return {name: np.nanstd(np.diff(course[len(course) // 2 :])) for name, course in courses.items()}
+    return {name: pd.Series(np.diff(course[len(course) // 2 :])).std() for name, course in courses.items()}
 
 
 def beats_heuristics(method: str):
