@@ -297,7 +297,7 @@ def gated_covers_more(evidence):
     "Table 2",
     MAIN,
     why="The less a policy differs between weights, the nearer its points lie; a front of one point is not sparse.",
-    note="Of gains; a policy that does the same at every weight has one point, and no sparsity. By the paper less is better.",
+    note="Of gains; a policy that does the same at every weight has one point, and none. Less is better, by the paper.",
 )
 def sparsity_order(evidence):
     sparsity = {script: sparsities(evidence, script) for script in (CURRICULUM, GATED, EUPG)}
