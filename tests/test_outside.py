@@ -14,7 +14,8 @@ TOY_YEARS = 10
 
 @pytest.fixture(scope="module")
 def task():
-    return protocol.Task.of("boreal-balanced-v0", years=TOY_YEARS)
+    few = {"density_stems_ha": (30.0, 60.0)}  # too few to be thinned by 100
+    return protocol.Task.of("boreal-balanced-v0", years=TOY_YEARS, initial_ranges=few)
 
 
 def play(env, number=1):
