@@ -3,7 +3,7 @@
     python analysis/archive.py [--runs-dir runs] [--archive-dir results/runs]
 
 A run's folder there has its config.json as it is, tables.zip with the tables that `analysis/reduction.py` names, and,
-of the runs of the main experiment, policy.pt: the agent, which `cleanrl_style.protocol.load_agent` loads.
+of the runs of the main table, on either task, policy.pt: the agent, which `cleanrl_style.protocol.load_agent` loads.
 """
 
 import shutil
@@ -17,6 +17,7 @@ from cleanrl_style import protocol
 from cleanrl_style.protocol.run_folder import folder_name
 
 POLICY = "policy.pt"
+MAIN = ("main", "balanced")
 
 
 @dataclass
@@ -46,12 +47,12 @@ def folder_of(config: dict, archive_dir: Path) -> Path:
 
 
 def archive_run(run: runs.Run, archive_dir: Path, jobs: list[experiments.Job]) -> bool:
-    """Archive a run, its policy if a job of the main experiment made it; False if the archive has it, of the same
+    """Archive a run, its policy if a job of the main table made it; False if the archive has it, of the same
     commit.
     """
     folder, config = folder_of(run.config, archive_dir), (run.folder / "config.json").read_bytes()
     policy = run.folder / POLICY
-    keeps_policy = policy.exists() and any(job.experiment == "main" and job.made(run.config) for job in jobs)
+    keeps_policy = policy.exists() and any(job.experiment in MAIN and job.made(run.config) for job in jobs)
     kept = {"config.json": config} | ({POLICY: policy.read_bytes()} if keeps_policy else {})
     there = {name: (folder / name).read_bytes() for name in kept if (folder / name).exists()}
     if there == kept and (folder / runs.ARCHIVED).exists():

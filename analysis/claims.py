@@ -23,13 +23,18 @@ from analysis.paper_claims import (
     preference,
     speed,
     strategies,
+    summary,
 )
 from analysis.paper_claims.claim import (
+    COMPARED,
     CONTRADICTS,
+    DIRECTION,
+    FAILS,
     FEWEST_SEEDS,
+    HOLDS,
+    KINDS,
+    LEVEL,
     NO_RUNS,
-    NOT_REPRODUCED,
-    REPRODUCED,
     UNDECIDED,
     UNTESTABLE,
     VERDICTS,
@@ -44,41 +49,50 @@ from cleanrl_style import protocol
 
 THEMES = (environment, asymmetry, performance, preference, curriculum, mechanisms, strategies, speed, paper_itself)
 MEANING = {
-    REPRODUCED: "our numbers meet the rule that the claim names",
-    NOT_REPRODUCED: "they meet its opposite",
+    HOLDS: "our numbers meet the rule that the claim names",
+    FAILS: "they meet its opposite",
+    COMPARED: "a level of another simulator, beside ours",
     CONTRADICTS: "another number of the paper, or its own definitions, exclude it",
     UNTESTABLE: "what it needs is not logged, or not there",
     UNDECIDED: f"the interval leaves both open, or there are fewer than {FEWEST_SEEDS} training seeds",
     NO_RUNS: "what it needs has not been run",
 }
 
-INTRODUCTION = """\
+HEAD = """\
 # The paper's claims
 
-Written by `python analysis/claims.py`; not to be edited. The claims of the paper
-([Dsouza et al. 2025](https://arxiv.org/abs/2509.19846)) that a number can test: the paper's value, ours, and a verdict
-that is computed from the numbers by the rule that stands with the claim.
+What of the paper ([Dsouza et al. 2025](https://arxiv.org/abs/2509.19846)) holds here: every claim that a number can
+test, with the paper's value, ours, and a verdict that is computed from the numbers by the rule that stands with the
+claim. Written by `python analysis/claims.py`; not to be edited.
+"""
+INTRODUCTION = """\
+## How it is judged
 
-Its simulator and ours are two programs with the same purpose. Values of returns, densities and fluxes need not agree;
-what a method can do, what comes out ahead, and which way a mechanism works should. Where ours differ, the claim says
-why, as far as an experiment tells.
+The paper's simulator and ours are two programs with the same purpose. Values of returns, densities and fluxes need not
+agree; what a method can do, what comes out ahead, and which way a mechanism works should. Where ours differ, the claim
+says why, as far as an experiment tells.
 
-**Numbers.** Ours are interquartile means over training seeds with 95 % bootstrap intervals, of sampled policies on the
-same evaluation sites and weathers; differences between methods are paired by seed. Returns are sums over 50 years;
-gains are returns less those of zero change on the same episodes. What is over sites or episodes is a mean with its 95 %
-t interval, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
+**Numbers.** Ours are interquartile means over training seeds with 95 % bootstrap intervals, of the policy that the runs
+name primary (greedy; sampled in runs of before it was) on the same evaluation sites and weathers; differences between
+methods are paired by seed. Returns are sums over 50 years; gains are returns less those of zero change on the same
+episodes. What is over sites or episodes is a mean with its 95 % t interval, a correlation with Fisher's, a share with
+Wilson's, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
 pairs of stands are compared the active layer stands beside it.
 
-**Verdicts.** A claim that one thing is more than another is reproduced if the whole interval of the difference has its
-sign; it is not if the interval has the other sign, or holds no effect worth the name: of a return a quarter of what the
-best constant plans gain over doing nothing, of what has the paper's units a quarter of its effect. Beyond that signs
-are judged, not sizes: how large the paper's difference is stands beside ours. A value or a range is reproduced if all
-of our interval lies in it, give or take a tenth, and not if all of it lies outside. A cost (time, memory, money) is
-reproduced if ours is no larger. A claim of several parts is not reproduced if one of them is not. A bootstrap over few
-seeds is too narrow (of normal values it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five,
-and for the t interval of the seeds' mean, which is not printed, to agree. Dozens of intervals are judged one by one,
-uncorrected. Those over training seeds hold for these evaluation sites: other sites are another matter. Curriculum and
-PPO Gated of one seed train on the same episodes; EUPG's batches are others, and share the evaluation alone.
+**Kinds and votes.** Claims of the paper are sorted by what they are about, and every fact has one vote: a claim that
+states another's fact once more names it and has none. A level, a return or a density of another simulator, is set
+beside ours and never failed.
+
+**Verdicts.** A claim that one thing is more than another holds if the whole interval of the difference has its sign. It
+does not if the interval has the other sign, or no effect worth the name in it: of a return a quarter of what the best
+constant plans gain over doing nothing, of what has the paper's units a quarter of its effect. Beyond that signs are
+judged, not sizes: how large the paper's difference is stands beside ours. A value or a range is met if all of our
+interval lies in it, give or take a tenth, and not if all of it lies outside. A cost is met if ours is no larger. A
+claim of several parts does not hold if one of them does not. A bootstrap over few seeds is too narrow (of normal values
+it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five, and for the t interval of the seeds'
+mean, which is not printed, to agree. Dozens of intervals are judged one by one, uncorrected. Those over training seeds
+hold for these evaluation sites: other sites are another matter. Curriculum and PPO Gated of one seed train on the same
+episodes; EUPG's are others, and share the evaluation alone.
 """
 
 
@@ -97,9 +111,12 @@ class Args:
 def judge(claim: Claim, evidence: Evidence) -> Finding:
     """What the evidence says of a claim; a claim that lacks something has no rows."""
     try:
-        return claim.measure(evidence)
+        found = claim.measure(evidence)
     except Missing as lacking:
         return Finding([], NO_RUNS, str(lacking))
+    if claim.kind == LEVEL and found.verdict in (HOLDS, FAILS, UNDECIDED):
+        return Finding(found.rows, COMPARED)
+    return found
 
 
 def table(rows) -> list[str]:
@@ -111,53 +128,68 @@ def table(rows) -> list[str]:
     return lines
 
 
-def explanation(claim: Claim, found: Finding) -> list[str]:
-    """The rule, the mechanism if the claim is not reproduced, and the note."""
+def explanation(claim: Claim, found: Finding, numbers: dict[Claim, int]) -> list[str]:
+    """The rule, whose fact it is, the mechanism if the claim does not hold, and the note."""
     lines = []
     if found.rule and found.verdict != UNTESTABLE:
-        lines.append(f"Reproduced if {found.rule}.")
+        lines.append(f"Holds if {found.rule}.")
+    if claim.repeats is not None:
+        number = numbers[claim.repeats]
+        lines.append(f"No vote: the fact is that of [claim {number}](#claim-{number}).")
     if found.waits:
         lines.append(f"Too few training seeds for a verdict: {FEWEST_SEEDS} are needed.")
-    if found.verdict in (NOT_REPRODUCED, CONTRADICTS) and claim.why:
+    if found.verdict in (FAILS, CONTRADICTS, COMPARED) and claim.why:
         lines.append(f"Why: {claim.why}")
-    elif found.verdict == NOT_REPRODUCED and claim.command:
+    elif found.verdict == FAILS and claim.command:
         lines.append("Why: no experiment has separated that yet.")
     return lines + [claim.note] if claim.note else lines
 
 
-def section(number: int, claim: Claim, found: Finding) -> str:
-    """A claim as Markdown."""
+def section(claim: Claim, found: Finding, numbers: dict[Claim, int]) -> str:
+    """A claim as Markdown; numbers : of all claims."""
+    number = numbers[claim]
     head = [
         f'<a id="claim-{number}"></a>',
         "",
         f"### {number}. {claim.statement}",
         "",
-        f"{claim.where}. **{found.verdict[0].upper()}{found.verdict[1:]}.**",
+        f"{claim.where}. {claim.kind[0].upper()}{claim.kind[1:]}. **{found.verdict[0].upper()}{found.verdict[1:]}.**",
     ]
     if found.verdict == NO_RUNS:
         return "\n".join([*head, "", f"No runs yet: `{claim.command}` ({found.rule} is lacking)", ""])
     source = f"`{claim.command}`" if claim.command else "From the paper and this project's tables alone."
-    return "\n".join([*head, "", *table(found.rows), "", " ".join(explanation(claim, found)), "", source, ""])
+    words = " ".join(explanation(claim, found, numbers))
+    return "\n".join([*head, "", *table(found.rows), "", *([words, ""] if words else []), source, ""])
 
 
-def contents(themes: dict[str, dict[int, str]], controls: int) -> str:
-    """Claims by verdict, then by theme, as tables; themes : title -> number of the claim -> verdict."""
-    verdicts = {number: verdict for theme in themes.values() for number, verdict in theme.items()}
+def votes(findings: dict[Claim, Finding], kind: str) -> Counter:
+    """Facts of a kind by verdict."""
+    return Counter(found.verdict for claim, found in findings.items() if claim.kind == kind and claim.repeats is None)
+
+
+def contents(findings: dict[Claim, Finding], numbers: dict[Claim, int]) -> str:
+    """Facts by kind and verdict, claims by verdict, and the themes, as tables."""
+    shown = [verdict for verdict in VERDICTS if any(found.verdict == verdict for found in findings.values())]
+    facts = sum(claim.repeats is None for claim in findings)
     lines = [
-        f"{len(verdicts)} claims, {controls} of them controls of ours that the paper does not speak of (they say so):",
+        f"{len(findings)} claims on {facts} facts:",
         "",
-        "| verdict | claims | | that is |",
-        "|---|---|---|---|",
+        "| kind | facts | " + " | ".join(shown) + " | that is |",
+        "|---" * (len(shown) + 3) + "|",
     ]
-    for verdict in VERDICTS:
-        of_it = [number for number in verdicts if verdicts[number] == verdict]
+    for kind, meaning in KINDS.items():
+        counts = votes(findings, kind)
+        cells = [kind, str(counts.total()), *(str(counts[verdict] or "") for verdict in shown), meaning]
+        lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "| verdict | claims | | that is |", "|---|---|---|---|"]
+    for verdict in shown:
+        of_it = [numbers[claim] for claim, found in findings.items() if found.verdict == verdict]
         links = " ".join(f"[{number}](#claim-{number})" for number in of_it)
         lines.append(f"| {verdict} | {len(of_it)} | {links} | {MEANING[verdict]} |")
-    lines += ["", "| theme | claims | " + " | ".join(VERDICTS) + " |", "|---" * (2 + len(VERDICTS)) + "|"]
-    for title, theme in themes.items():
-        counts = [list(theme.values()).count(verdict) for verdict in VERDICTS]
-        cells = [f"[{title}](#claim-{min(theme)})", f"{min(theme)} - {max(theme)}", *(str(n or "") for n in counts)]
-        lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "| theme | claims |", "|---|---|"]
+    for theme in THEMES:
+        first, last = numbers[theme.CLAIMS[0]], numbers[theme.CLAIMS[-1]]
+        lines.append(f"| [{theme.TITLE}](#claim-{first}) | {first} - {last} |")
     return "\n".join([*lines, ""])
 
 
@@ -178,21 +210,20 @@ def progress(results: Results) -> str:
 
 
 def document(results: Results) -> tuple[str, Counter]:
-    """The document, and the number of claims by verdict."""
-    evidence, sections, themes, number = Evidence(results), [], {}, 0
-    controls = sum("our control" in claim.where for theme in THEMES for claim in theme.CLAIMS)
+    """The document, and the number of facts by verdict."""
+    evidence = Evidence(results)
+    claims = [claim for theme in THEMES for claim in theme.CLAIMS]
+    numbers = {claim: number for number, claim in enumerate(claims, start=1)}
+    findings = {claim: judge(claim, evidence) for claim in claims}
+    known = {claim: (numbers[claim], findings[claim]) for claim in claims}
+    ten = "## Ten sentences\n\n" + summary.sentences(known, votes(findings, DIRECTION))
+    parts = [HEAD, ten, INTRODUCTION, contents(findings, numbers)]
     for theme in THEMES:
-        sections.append(f"## {theme.TITLE}\n")
-        themes[theme.TITLE] = {}
-        for claim in theme.CLAIMS:
-            number += 1
-            found = judge(claim, evidence)
-            themes[theme.TITLE][number] = found.verdict
-            sections.append(section(number, claim, found))
+        parts += [f"## {theme.TITLE}\n", *(section(claim, findings[claim], numbers) for claim in theme.CLAIMS)]
     last = "## What has been run\n\n`python analysis/reproduce.py` makes all, and goes on where it stopped.\n\n"
     left_out = "".join(f"\nLeft out: {line}\n" for line in results.left_out)
-    text = "\n".join([INTRODUCTION, contents(themes, controls), *sections, last + progress(results) + "\n"]) + left_out
-    return text, Counter(verdict for theme in themes.values() for verdict in theme.values())
+    text = "\n".join([*parts, last + progress(results) + "\n"]) + left_out
+    return text, sum((votes(findings, kind) for kind in KINDS), Counter())
 
 
 def main(args: Args) -> None:
@@ -207,7 +238,7 @@ def main(args: Args) -> None:
     except OSError as error:
         sys.exit(f"error: --output {path}: cannot write there ({error.strerror})")
     of_each = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
-    print(f"{path}: {counts.total()} claims of the paper; {of_each}")
+    print(f"{path}: {counts.total()} facts that the paper claims or that we asked about; {of_each}")
 
 
 if __name__ == "__main__":

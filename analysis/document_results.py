@@ -17,7 +17,7 @@ import pandas as pd
 from analysis import excerpts, experiments, methods, metrics, paths
 from analysis.experiments import GENERALIST
 from analysis.results import Results
-from analysis.tables import distance_to_best, main_results, single_sites
+from analysis.tables import distance_to_best, main_results, runtime, single_sites
 from analysis.tables.common import over_seeds
 from cleanrl_style import protocol
 
@@ -25,7 +25,9 @@ PAGES = (
     "README.md",
     "docs/learning.md",
     "docs/performance.md",
-    *(f"docs/algorithms/{name}.md" for name in (*methods.TRAINED, "heuristics")),
+    "docs/outside.md",
+    *(f"docs/algorithms/{name}.md" for name in methods.scripts(methods.CONDITIONED, methods.FIXED_WEIGHT)),
+    "docs/algorithms/heuristics.md",
 )
 SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
 ENDS = (0.0, 1.0)  # weights
@@ -155,6 +157,25 @@ def sites_alone(results: Results) -> str:
     return text
 
 
+def other_libraries(results: Results) -> str:
+    """Score, gain, hours and memory of the algorithms of other libraries, a row an environment and setting."""
+    columns = ("method", "environment", "seeds", "score, greedy", "score, sampled", "gain", "hours", "GB")
+    columns += ("steps", "steps of its own evaluation")
+    text = "| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|\n"
+    rows = [(key, found) for key, found in results.rows.items() if key[0] in methods.OUTSIDE and found]
+    for (script, env_id, setting), replicates in rows:
+        runs = [run for one in replicates for run in one.runs]
+        cost = pd.concat([run.tables["cost"] for run in runs]).median()
+        hours = np.median([sum(runtime.hours(run)[name] for name in ("training", "evaluation")) for run in runs])
+        scores = main_results.scores(replicates)
+        shown = [scores["score_greedy"], scores["score_sampled"], scores.get("gain_scalarized", np.nan)]
+        cells = [", ".join(filter(None, (methods.title(script), flags(setting)))), f"`{env_id}`", str(len(replicates))]
+        cells += ["" if np.isnan(x) else f"{x:.{digits}f}" for x, digits in zip(shown, (0, 0, 2), strict=True)]
+        cells += [f"{hours:.1f}", f"{cost.peak_memory_mb / 1000:.1f}", f"{cost.steps:,.0f}"]
+        text += "| " + " | ".join([*cells, f"{cost.own_evaluation_steps:,.0f}"]) + " |\n"
+    return text if rows else "No runs yet.\n"
+
+
 def section(results: Results, name: str) -> str:
     """What stands between the comments: of all methods, of the heuristics, of one script, or another table."""
     if name in EXCERPTS:
@@ -179,7 +200,7 @@ def section(results: Results, name: str) -> str:
     return HEADING.format(what=what) + "".join(line(*row) for row in rows)
 
 
-TABLES = {"distances": distances, "single_sites": sites_alone}
+TABLES = {"distances": distances, "single_sites": sites_alone, "outside": other_libraries}
 EXCERPTS = {
     "speed": excerpts.speed,
     "shares": excerpts.shares,

@@ -6,6 +6,8 @@ CONDITIONED = "conditioned on the preference"
 FIXED_WEIGHT = "trained for one weight"
 HEURISTIC = "fixed strategy of the paper"
 CONTROL = "fixed strategy of ours"
+OTHERS = "of another library"
+FOLDERS = {HEURISTIC: "baselines_heuristic", CONTROL: "baselines_heuristic", OTHERS: "analysis/outside"}
 
 
 @dataclass(frozen=True)
@@ -22,12 +24,12 @@ class Method:
     @property
     def trains(self) -> bool:
         """Whether it is trained."""
-        return self.kind in (CONDITIONED, FIXED_WEIGHT)
+        return self.kind in (CONDITIONED, FIXED_WEIGHT, OTHERS)
 
     @property
     def path(self) -> str:
         """The script's file, relative to the repository."""
-        return f"{'cleanrl_style' if self.trains else 'baselines_heuristic'}/{self.script}.py"
+        return f"{FOLDERS.get(self.kind, 'cleanrl_style')}/{self.script}.py"
 
 
 # Colours of Okabe and Ito (2008): told apart with every kind of colour vision; the markers tell them apart in grey.
@@ -42,6 +44,11 @@ ROWS = (
     Method("ppo_curriculum", "Curriculum PPO", CONDITIONED, "#D55E00", "o", "curriculum_ppo"),
     Method("ppo_group", "Group PPO", CONDITIONED, "#F0E442", "P"),
     Method("eupg_fixed_lambda", "Fixed λ EUPG", FIXED_WEIGHT, "#0072B2", "D", "fixed_weight_eupg"),
+    Method("pcn", "PCN", OTHERS, "#E69F00", "p"),
+    Method("gpi_ls", "GPI-LS", OTHERS, "#56B4E9", "h"),
+    Method("envelope", "Envelope", OTHERS, "#CC79A7", "8"),
+    Method("morld", "MORL/D", OTHERS, "#D55E00", "X"),
+    Method("maskable_ppo", "MaskablePPO", OTHERS, "#0072B2", "d"),
 )
 METHODS = {method.script: method for method in ROWS}
 
@@ -52,8 +59,9 @@ def scripts(*kinds: str) -> tuple[str, ...]:
 
 
 LEARNERS = scripts(CONDITIONED)
-TRAINED = scripts(CONDITIONED, FIXED_WEIGHT)
+TRAINED = scripts(CONDITIONED, FIXED_WEIGHT, OTHERS)
 STRATEGIES = scripts(HEURISTIC, CONTROL)
+OUTSIDE = scripts(OTHERS)
 
 
 def title(script: str) -> str:

@@ -12,6 +12,7 @@ composition  the last fifth of the training: episodes by their last year's conif
 sample       every EVERY-th round of the training's episodes, one by one
 selection    what a curriculum accepted, and how its threshold moved
 timing       seconds by phase
+cost         of another library's run: steps, of training and of its own evaluations, and its largest memory
 """
 
 import io
@@ -47,6 +48,8 @@ def reduce(tables: dict[str, pd.DataFrame], steps: int | None, primary: str) -> 
     steps : of its training; None for a fixed strategy. primary : the policy that its results are about
     """
     kept = {"evaluation": evaluation(tables["evaluation"], primary), "timing": timing(tables["timing"])}
+    if "cost" in tables:
+        kept["cost"] = tables["cost"]
     if "evaluation_years" in tables:
         record = tables["evaluation_years"]
         record = record[record.policy == primary].drop(columns="policy")

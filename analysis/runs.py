@@ -111,10 +111,10 @@ def read_archived(folder: Path) -> dict[str, pd.DataFrame]:
 def read_whole(folder: Path, trained: bool) -> dict[str, pd.DataFrame]:
     """The tables of a run of runs/; ValueError says which is missing or cannot be read."""
     tables = {}
-    for name in ("evaluation", "timing", "evaluation_years", *(["episodes", "validation"] if trained else [])):
+    for name in ("evaluation", "timing", "evaluation_years", "cost", *(["episodes", "validation"] if trained else [])):
         path = folder / f"{name}.csv"
-        if not path.exists() and name in ("evaluation_years", "validation"):
-            continue  # its environment is not ours
+        if not path.exists() and name in ("evaluation_years", "validation", "cost"):
+            continue  # its environment keeps no annual record or is not ours; the run is ours
         if not path.exists():
             raise ValueError(f"{'unfinished' if name == 'evaluation' else 'partial'}: it has no {name}.csv")
         try:

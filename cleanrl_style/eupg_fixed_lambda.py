@@ -1,5 +1,5 @@
-# EUPG with fixed lambda: a policy gradient weighted by the utility of the whole episode's return, whose policy
-# sees the return accrued so far; one preference throughout. eupg_var_lambda.py draws one for each episode.
+# EUPG with fixed lambda: a policy gradient weighted by the utility of the rewards to come, whose policy sees the
+# return accrued so far; one preference throughout. eupg_var_lambda.py draws one for each episode.
 # After Roijers, Steckelmacher and Nowe (2018). Its skeleton is that of CleanRL's scripts.
 import math
 import random
@@ -35,8 +35,8 @@ class Args:
     """observe no site parameters"""
     total_timesteps: int | None = None
     """steps, summed over all environments; episodes are played whole (None: 300000, in site-specific mode 100000)"""
-    num_envs: int = 8
-    """number of environments, and of episodes in a batch; 1 is the paper's"""
+    num_envs: int = 1
+    """number of environments, and of episodes in an update"""
     vectorization: Literal["async", "lockstep"] = "async"
     """environments in worker processes, or all in one compiled call"""
     preference: float | tuple[float, ...] = 0.5
@@ -51,8 +51,8 @@ class Args:
     """what a return is worth: the weighted sum, or minus the largest weighted shortfall from an ideal point"""
     ideal_point: tuple[float, ...] | None = None
     """of chebyshev, a return for each objective (None: that of the constant plan which is best in it)"""
-    utility: Literal["total", "future"] = "total"
-    """what weights an action's gradient: utility of the episode's whole return, accrued and future; or of the future"""
+    utility: Literal["total", "future"] = "future"
+    """what weights an action's gradient: utility of the rewards to come; or of the whole return, accrued and future"""
     baseline: Literal["none", "others"] = "none"
     """what is subtracted from a return: nothing, by the definition, or the mean of the batch's other episodes"""
     ent_coef: float = 0.0

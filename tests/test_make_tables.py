@@ -424,7 +424,7 @@ def test_single_sites(tmp_path):
     row = table.loc["1"]
     assert (row.thaw_baseline, row.carbon_baseline) == (7 - 2, 5 - 1)
     assert (row.thaw_plan, row.carbon_plan) == (1, 3)
-    assert np.isnan(row.thaw_eupg) and np.isnan(row.thaw_future)
+    assert np.isnan(row.thaw_eupg) and np.isnan(row.thaw_total)
 
 
 def test_studies_leave_out_nothing_silently(tmp_path):

@@ -16,15 +16,18 @@ from cleanrl_style.ppo_gated import Args
 
 COUNTS = {
     "main": 2 + len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
+    "balanced": len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
+    "group": 30,
+    "outside": 10 * len(methods.OUTSIDE),
     "fixed": 25,
     "site": 45,
     "thaw": 12,
-    "balanced": len(methods.STRATEGIES) + 5 * len(methods.LEARNERS),
     "controls": 20,
-    "variants": 40,
+    "variants": 35,
     "mechanisms": 2,
     "single": 6,
     "difficulty": 3,
+    "budgets": 10,
 }
 
 
@@ -67,6 +70,7 @@ def test_a_job_knows_its_run():
 
 def test_a_variant_knows_its_run():
     job = next(job for job in experiments.jobs(["variants"]) if "reward_scales" in job.flags)
+    assert experiments.jobs(["outside"], [2])[0].command == "python analysis/outside/pcn.py --seed 2"
     assert job.command == ("python cleanrl_style/ppo_gated.py --seed 1 --vectorization lockstep --reward-scales 1.11 1")
     args = Args(vectorization="lockstep", reward_scales=experiments.REWARD_SCALES)
     protocol.make_task(args)

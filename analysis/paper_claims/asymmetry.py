@@ -6,7 +6,9 @@ import pandas as pd
 from analysis import metrics
 from analysis.experiments import GENERALIST
 from analysis.paper_claims.claim import (
+    CONTROL,
     LEAST,
+    LEVEL,
     QUARTER,
     UNDECIDED,
     Finding,
@@ -78,7 +80,7 @@ def rows_of(evidence, weight: float, papers: str) -> list[Row]:
     "Agents trained for carbon alone learn fast.",
     "Section 4.2, figure 2a",
     FIXED,
-    why="EUPG has no baseline: it weighs every action by the episode's whole return, much of which is the site's.",
+    why="EUPG has no baseline: it weighs every action by all that is to come, much of which is the site's.",
     note=LIMIT,
 )
 def carbon_is_learnt(evidence):
@@ -170,18 +172,18 @@ def constant_gains(evidence, weight: float) -> pd.Series:
     "Section 4.2 and 5 (our control, on single sites)",
     only("main", "site"),
     why="Episodes of site-specific mode differ in the agent's actions alone, so there is no noise but theirs; the "
-    "delay is there. EUPG weighs every action by the whole return, and thaw's is large beside what a policy "
+    "delay is there. EUPG weighs every action by all that is to come, and thaw's is large beside what a policy "
     "moves. With the mean of the batch's other episodes taken off, which leaves the expected gradient as it is, "
     "agents of thaw alone gain what constant plans can, by the same physics. Over all sites a common mean is no "
     "such help, for it is the sites that differ (`docs/learning.md`).",
-    note="The paper names delay and noise together; the noise of sites is judged below. morl-baselines' EUPG, which "
-    "the paper names, weighs an action by the rewards to come.",
+    note="The paper names delay and noise together; the noise of sites is judged below.",
+    kind=CONTROL,
 )
 def physics_hides_thaw(evidence):
     gains = {
         (name, baseline): mean_of(own_gains(evidence, weight, **flags), "sites")
         for name, weight in (("thaw", THAW), ("carbon", CARBON))
-        for baseline, flags in (("no baseline, as the definition", {}), ("`--baseline others`", {"baseline": "others"}))
+        for baseline, flags in (("no baseline, as the paper", {}), ("`--baseline others`", {"baseline": "others"}))
     }
     rows = [
         Row(f"{name} over zero change, agents of {name} alone, {baseline}", "", number)
@@ -189,9 +191,9 @@ def physics_hides_thaw(evidence):
     ]
     rows.append(
         Row(
-            "thaw over zero change, agents of thaw alone, rewards to come (`--utility future`)",
+            "thaw over zero change, agents of thaw alone, whole return (`--utility total`)",
             "",
-            optional(lambda: mean_of(own_gains(evidence, THAW, utility="future"), "sites")),
+            optional(lambda: mean_of(own_gains(evidence, THAW, utility="total"), "sites")),
         )
     )
     rows += [
@@ -219,6 +221,7 @@ def at_the_end(evidence, weight: float, column: str) -> pd.Series:
     FIXED,
     why="Density after fifty years is a balance of planting and self-thinning, whose strength is a property of the "
     "simulator; densities of two simulators need not agree.",
+    kind=LEVEL,
 )
 def carbon_density(evidence):
     density = seeds(at_the_end(evidence, CARBON, "final_density"))
@@ -230,6 +233,7 @@ def carbon_density(evidence):
     "Section 4.2, figure 2c",
     FIXED,
     why="Trees shelter the ground here and thin its snow, so an agent of thaw plants as well.",
+    kind=LEVEL,
 )
 def thaw_density(evidence):
     density = seeds(at_the_end(evidence, THAW, "final_density"))

@@ -4,12 +4,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
-REPRODUCED, NOT_REPRODUCED = "reproduced", "not reproduced"
+HOLDS, FAILS, COMPARED = "holds", "does not hold in our simulator", "compared"
 CONTRADICTS = "the paper contradicts itself"
 UNTESTABLE = "cannot be tested here"
 UNDECIDED, NO_RUNS = "undecided", "no runs yet"
-VERDICTS = (REPRODUCED, NOT_REPRODUCED, CONTRADICTS, UNTESTABLE, UNDECIDED, NO_RUNS)
+VERDICTS = (HOLDS, FAILS, COMPARED, CONTRADICTS, UNTESTABLE, UNDECIDED, NO_RUNS)
+
+DIRECTION, LEVEL, IMPLEMENTATION = "direction", "level", "implementation"
+COST, ARITHMETIC, CONTROL = "cost", "arithmetic", "own control"
+KINDS = {
+    DIRECTION: "what comes out ahead, and which way a mechanism works",
+    LEVEL: "a number of another simulator: set beside ours, never failed",
+    IMPLEMENTATION: "what the environment is made of",
+    COST: "time, memory and money, which are met if ours are no larger",
+    ARITHMETIC: "the paper's tables against each other, without ours",
+    CONTROL: "experiments of ours on why, of which the paper does not speak",
+}
 
 SEEDS = "training seeds"
 FEWEST_SEEDS = 5  # for a verdict: a 95 % bootstrap interval over three covers 75 % of the time, over five 91 %
@@ -89,7 +101,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Answer:
-    """Whether a claim holds (None: the numbers do not decide), and the rule as text: "reproduced if .."."""
+    """Whether a claim holds (None: the numbers do not decide), and the rule as text: "holds if .."."""
 
     holds: bool | None
     rule: str
@@ -106,9 +118,9 @@ class Finding:
     waits: bool = False
 
 
-def finding(rows: list[Row], answer: Answer, otherwise: str = NOT_REPRODUCED) -> Finding:
+def finding(rows: list[Row], answer: Answer, otherwise: str = FAILS) -> Finding:
     """The finding of an answer; `otherwise` is the verdict on a claim that does not hold."""
-    verdict = UNDECIDED if answer.holds is None else REPRODUCED if answer.holds else otherwise
+    verdict = UNDECIDED if answer.holds is None else HOLDS if answer.holds else otherwise
     return Finding(rows, verdict, answer.rule, answer.waits)
 
 
@@ -116,8 +128,9 @@ def finding(rows: list[Row], answer: Answer, otherwise: str = NOT_REPRODUCED) ->
 class Claim:
     """A claim of the paper; `measure` turns the evidence into a finding, or raises Missing.
 
-    why : the mechanism, printed if the claim is not reproduced; note : printed always. Neither has a number in it:
-    numbers are in the rows. command : what makes the runs, "" if the paper's tables are enough.
+    why : the mechanism, printed if the claim does not hold; note : printed always. Neither has a number in it: numbers
+    are in the rows. command : what makes the runs, "" if the paper's tables are enough. kind : one of KINDS.
+    repeats : the claim whose fact it states once more; it has no vote of its own then.
     """
 
     statement: str
@@ -126,11 +139,13 @@ class Claim:
     measure: Callable
     why: str = ""
     note: str = ""
+    kind: str = DIRECTION
+    repeats: "Claim | None" = None
 
 
-def claim(statement: str, where: str, command: str = "", why: str = "", note: str = "") -> Callable:
+def claim(statement: str, where: str, command: str = "", **more) -> Callable:
     """Makes a claim of the function below it."""
-    return lambda measure: Claim(statement, where, command, measure, why, note)
+    return lambda measure: Claim(statement, where, command, measure, **more)
 
 
 # ------------------------------------------------------------------------------------------------ rules
@@ -167,6 +182,12 @@ def within(number: Number, low: float, high: float, what: str = "the value") -> 
 def equals(value: float, wanted: float, what: str) -> Answer:
     """Holds if a count is the wanted one."""
     return Answer(bool(value == wanted), f"{what} is {short(wanted)}")
+
+
+def share(count: int, of: int, over: str) -> Number:
+    """A share with its Wilson interval."""
+    ends = stats.binomtest(count, of).proportion_ci(method="wilson")
+    return Number(count / of, ends.low, ends.high, over, of)
 
 
 def about(number: Number, low: float, high: float | None = None, what: str = "the value") -> Answer:

@@ -4,7 +4,19 @@ import numpy as np
 
 import boreal_env
 import sim
-from analysis.paper_claims.claim import CONTRADICTS, Number, Row, about, all_of, claim, equals, finding, within
+from analysis.paper_claims.claim import (
+    CONTRADICTS,
+    IMPLEMENTATION,
+    LEVEL,
+    Number,
+    Row,
+    about,
+    all_of,
+    claim,
+    equals,
+    finding,
+    within,
+)
 from analysis.paper_claims.evidence import FRONTS, PAPER_ALONE, VARIANCE
 from analysis.tables.common import paper
 from sim.state import DAYS
@@ -20,18 +32,28 @@ OPTIMUM = 50.0
     "The 25 actions are unique: five density changes times five conifer fractions.",
     "Section 3.2; table of actions",
     PAPER_ALONE,
-    why="Planting and thinning are the only ways in which an action reaches the stand, in the paper's timeline of a "
-    "year too. Without either the conifer fraction has nothing to act on, so those actions are one.",
+    note="Every code is another pair. Without planting or thinning the conifer fraction has nothing to act on, so that "
+    "five of them do the same.",
+    kind=IMPLEMENTATION,
 )
 def unique_actions(evidence):
     density, mix = sim.management.decode(np.arange(sim.management.NUM_ACTIONS))
     different = len({(d, m if d else None) for d, m in zip(density, mix, strict=True)})
     codes = Number(sim.management.NUM_ACTIONS)
-    rows = [Row("codes of actions", "25", codes), Row("actions that can differ in effect", "25", Number(different))]
-    return finding(rows, equals(different, 25, "the number of different actions"))
+    unique = len(set(zip(density, mix, strict=True)))
+    rows = [
+        Row("codes of actions", "25", codes),
+        Row("pairs of density change and conifer fraction", "25", Number(unique)),
+        Row("actions that can differ in effect", "", Number(different)),
+    ]
+    return finding(rows, equals(unique, 25, "the number of different pairs"))
 
 
-@claim("An observation has 105 entries, 43 without the site's parameters.", "Table 1; table of the observation")
+@claim(
+    "An observation has 105 entries, 43 without the site's parameters.",
+    "Table 1; table of the observation",
+    kind=IMPLEMENTATION,
+)
 def observation_entries(evidence):
     entries = len(boreal_env.OBSERVATION_NAMES)
     own = entries - len(sim.OBSERVED_SITE_PARAMETERS)
@@ -48,6 +70,7 @@ def observation_entries(evidence):
     "Table of sampling ranges",
     PAPER_ALONE,
     note="The ranges that it does not list are ours, with their sources in `sim/site_parameters.csv`.",
+    kind=IMPLEMENTATION,
 )
 def listed_parameters(evidence):
     listed = Number(sum("table of sampling ranges" in one.source for one in sim.SITE_PARAMETERS.values()))
@@ -58,7 +81,7 @@ def listed_parameters(evidence):
     return finding(rows, equals(listed.value, COMPONENTS[-1], "the number listed"), CONTRADICTS)
 
 
-@claim("A year is 17,520 steps of the physics.", "Appendix, runtime")
+@claim("A year is 17,520 steps of the physics.", "Appendix, runtime", kind=IMPLEMENTATION)
 def steps_of_a_year(evidence):
     ours = Number(DAYS * 24 * 60 // STEP_MINUTES)
     papers = paper("runtime", index_col="quantity").loc["physics_steps_per_year", "low"]
@@ -72,6 +95,7 @@ def steps_of_a_year(evidence):
     why="The range of a year's reward is the same by construction; how much of it is used is not. A real stand's "
     "carbon changes by a small part of the scale, while heat through the boundary differs from site to site by "
     "as much as the scale. `boreal-balanced-v0` has the carbon scale at which policies move both alike.",
+    kind=IMPLEMENTATION,
 )
 def comparable_scales(evidence):
     table = evidence.beside("variance/components.csv")
@@ -96,6 +120,7 @@ def comparable_scales(evidence):
     why="A carbon return of the number of years needs the scale's uptake every year, far more than boreal stands "
     "take up, and would fill both pools to the limits that the reward itself penalises well before the end. "
     "The thaw return is bounded by the heat that the climate drives through the boundary.",
+    kind=LEVEL,
 )
 def optimum(evidence):
     fronts, reward = evidence.beside("fronts/summary.csv"), boreal_env.Reward()

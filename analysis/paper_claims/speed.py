@@ -1,13 +1,29 @@
 """The appendix on running time: episodes, training, memory, cores and cost."""
 
+from functools import partial
+
 import pandas as pd
 
-from analysis.paper_claims.claim import UNTESTABLE, Finding, Missing, Number, Row, about, above, below, claim, finding
+from analysis.paper_claims.claim import (
+    COST,
+    LEVEL,
+    UNTESTABLE,
+    Finding,
+    Missing,
+    Number,
+    Row,
+    about,
+    above,
+    below,
+    finding,
+)
+from analysis.paper_claims.claim import claim as claim_of_any_kind
 from analysis.paper_claims.evidence import BENCHMARK, PROFILE, only, seeds
 from analysis.tables.common import paper
 from analysis.tables.runtime import hours, published
 
 TITLE = "Time, memory and cost"
+claim = partial(claim_of_any_kind, kind=COST)
 WORKERS = 16
 # On demand, Linux, us-east-1: docs.aws.amazon.com, Amazon EC2 Auto Scaling user guide, prices by instance hour
 DOLLARS_PER_HOUR = 0.68
@@ -46,8 +62,10 @@ def episode(evidence):
     "The same takes 12 to 15 s in pure Python.",
     "Appendix, runtime",
     BENCHMARK,
-    why="Interpreted, every operation on every lane's field is looked up anew; the uncompiled backend is there to "
-    "compare bits with, not to be fast. How much physics a step of the paper's has is not known.",
+    note="Of another program: interpreted, every operation on every lane's field is looked up anew here, and the "
+    "uncompiled backend is there to compare bits with, not to be fast. How much physics a step of the paper's has is "
+    "not known.",
+    kind=LEVEL,
 )
 def pure_python(evidence):
     name = "episode_50_years_pure_python"
@@ -117,7 +135,8 @@ def workers(evidence):
     "The canopy's solver takes 60 to 70 % of the physics.",
     "Appendix, runtime",
     PROFILE,
-    why="The canopy is solved by Newton's method in few iterations; the soil's answer, fluxes and snow cost as much.",
+    note="The canopy is solved by Newton's method in few iterations; the soil's answer, fluxes and snow cost as much.",
+    kind=LEVEL,
 )
 def solver_share(evidence):
     table = evidence.beside("profile_kernel.csv", pd.read_csv).set_index("phase")

@@ -5,7 +5,9 @@ import pandas as pd
 from analysis import methods
 from analysis.paper_claims.claim import (
     CONTRADICTS,
+    IMPLEMENTATION,
     LEAST,
+    LEVEL,
     UNTESTABLE,
     Finding,
     Missing,
@@ -20,7 +22,7 @@ from analysis.paper_claims.claim import (
     short,
 )
 from analysis.paper_claims.evidence import difference, first_and_last, only, optional, seeds
-from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED
+from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED, curriculum_beats_gated
 from analysis.paper_claims.preference import APART, change
 from analysis.results import by_year
 from analysis.tables.common import paper
@@ -49,6 +51,7 @@ def strategy(evidence, script: str, name: str) -> pd.Series:
     why="At equal weights the species hardly matters on average: what conifers gain in thaw they lose in carbon "
     "(`docs/learning.md`, signal to noise). Both PPOs stay near the even mix that they start from, EUPG goes "
     "where its seed leads.",
+    kind=LEVEL,
 )
 def conifer_fractions(evidence):
     ours = {script: seeds(strategy(evidence, script, "final_conifer_fraction")) for script in FRACTIONS}
@@ -74,6 +77,7 @@ def ordered(evidence, name: str, first: str, second: str, what: str, papers: str
     "Section 4.4, figure 4a",
     MAIN,
     why="Both are the same agent; the curriculum is trained on a part of the episodes.",
+    repeats=curriculum_beats_gated,
 )
 def gated_has_more_conifers(evidence):
     what = "conifer fraction in the last year"
@@ -85,6 +89,7 @@ def gated_has_more_conifers(evidence):
     "Section 4.4, figure 4b, c",
     MAIN,
     why="Both are the same agent; the curriculum is trained on a part of the episodes.",
+    repeats=curriculum_beats_gated,
 )
 def gated_is_denser(evidence):
     return ordered(evidence, "density", GATED, CURRICULUM, "stems/ha, mean over the years")
@@ -169,6 +174,7 @@ def gated_fails_permafrost(evidence):
     "Section 4.4; table of detailed objectives",
     MAIN,
     why="Trained on other episodes, the same agent finds the same kind of policy.",
+    repeats=curriculum_beats_gated,
 )
 def curriculum_protects(evidence):
     table = paper("detailed_objectives").groupby("method").thaw_mean.mean()
@@ -277,6 +283,7 @@ def gradient_dominance(evidence):
     MAIN,
     why="The growing season is a parameter of the site in the paper's own observation, between the days of first "
     "growth and of fall; days on which the air is warm enough, as logged here, no stand changes either.",
+    kind=IMPLEMENTATION,
 )
 def longer_season(evidence):
     days = {script: evidence.by_seed(mean_season, "main", script).days for script in (CURRICULUM, "zero_change")}

@@ -10,12 +10,12 @@ from analysis.studies import constant_plans
 
 TITLE = "Single sites"
 OBJECTIVES = {0.0: "thaw", 1.0: "carbon"}  # weight of carbon -> what it leaves alone
-VARIANTS = {"eupg": {}, "baseline": {"baseline": "others"}, "future": {"utility": "future"}}
+VARIANTS = {"eupg": {}, "baseline": {"baseline": "others"}, "total": {"utility": "total"}}
 COLUMNS = {
     "site_seed": "site seed",
     "thaw_eupg": "thaw gain, EUPG",
     "thaw_baseline": "baseline (others)",
-    "thaw_future": "utility (future)",
+    "thaw_total": "utility (total)",
     "thaw_plan": "best constant plan",
     "carbon_eupg": "carbon gain, EUPG",
     "carbon_baseline": "baseline (others)",

@@ -54,7 +54,7 @@ def fail(message: str):
 
 def describe(arguments: type) -> str:
     """What `--help` says of a script: of one that trains how to try it, and what becomes of it."""
-    if not hasattr(arguments, "total_timesteps"):
+    if not hasattr(arguments, "vectorization"):
         return arguments.__doc__
     return f"""{arguments.__doc__}
 

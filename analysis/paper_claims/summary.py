@@ -1,0 +1,111 @@
+"""What the paper's reader should know, in ten sentences, each made of a finding."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+from analysis.paper_claims import asymmetry, curriculum, mechanisms, paper_itself, performance, preference
+from analysis.paper_claims.claim import CONTRADICTS, DIRECTION, FAILS, HOLDS, Claim, Finding
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """A sentence on a claim: how it reads if the claim holds, if it does not, and if that is open.
+
+    row : the line of the claim's table whose numbers stand behind it.
+    """
+
+    claim: Claim
+    row: str
+    holds: str
+    fails: str
+    otherwise: str
+
+    def text(self, number: int, found: Finding) -> str:
+        """The sentence; number : the claim's."""
+        words = self.holds if found.verdict == HOLDS else self.otherwise
+        words = self.fails if found.verdict in (FAILS, CONTRADICTS) else words
+        row = next((row for row in found.rows if row.what == self.row), None)
+        numbers = "no runs yet"
+        if row is not None:
+            numbers = f"{row.what}: {row.ours}" + (f", the paper's {row.paper}" if row.paper else "")
+        return f"{words} ({numbers}; [claim {number}](#claim-{number}))."
+
+
+SENTENCES = (
+    Sentence(
+        performance.VALUES[performance.GATED],
+        "scalarised return",
+        *("Returns are of two simulators, so their levels say nothing: what can be compared are gains and signs",) * 3,
+    ),
+    Sentence(
+        performance.curriculum_beats_gated,
+        "scalarised, Curriculum less Gated",
+        "Choosing sites pays: Curriculum PPO is better than PPO Gated",
+        "Choosing sites does not pay here: Curriculum PPO is no better than PPO Gated",
+        "Whether choosing sites pays is open",
+    ),
+    Sentence(
+        performance.gated_beats_heuristics,
+        "PPO Gated less the best of them",
+        "PPO Gated is better than every fixed strategy",
+        "PPO Gated is no better than the best fixed strategy, which looks at nothing or at the density alone",
+        "Whether PPO Gated is better than every fixed strategy is open",
+    ),
+    Sentence(
+        preference.curriculum_follows,
+        "thaw return, weight 1 less weight 0",
+        "Curriculum PPO follows the preference in both returns",
+        "Curriculum PPO does not follow the preference in both returns",
+        "Whether Curriculum PPO follows the preference in both returns is open",
+    ),
+    Sentence(
+        asymmetry.asymmetry,
+        "carbon less thaw",
+        "EUPG learns carbon better than thaw",
+        "EUPG learns carbon no better than thaw",
+        "Whether EUPG learns carbon better than thaw is open",
+    ),
+    Sentence(
+        asymmetry.physics_hides_thaw,
+        "thaw over zero change, agents of thaw alone, `--baseline others`",
+        "On a single site thaw is not learnt even with a baseline: its delay is enough to hide it",
+        "What hides thaw is not its delay: on a single site the same agents learn it once a baseline is taken off",
+        "Whether delay alone hides thaw is open",
+    ),
+    Sentence(
+        curriculum.coin,
+        "difference, paired by seed",
+        "Selecting by site is worth more than selecting by a coin",
+        "Selecting by site is worth no more than selecting by a coin",
+        "Whether selecting by site is worth more than selecting by a coin is open",
+    ),
+    Sentence(
+        mechanisms.stems,
+        "thaw return that interception adds",
+        "Stems help permafrost by the snow that they catch and harm it by what they absorb, as the paper says",
+        "Snow caught by stems and what they absorb do not work on permafrost as the paper says",
+        "Stems and permafrost: part of what the paper says is open",
+    ),
+    Sentence(
+        paper_itself.hypervolumes,
+        "hypervolume, Curriculum PPO",
+        "The paper's hypervolumes follow from its table of detailed objectives",
+        "The paper's hypervolumes do not follow from its own table of detailed objectives",
+        "The paper's hypervolumes cannot be checked",
+    ),
+)
+
+
+def counted(verdicts: Counter) -> str:
+    """The first sentence: how the directions came out, a vote a fact."""
+    open_ = verdicts.total() - verdicts[HOLDS] - verdicts[FAILS]
+    return (
+        f"Of the {verdicts.total()} facts of the kind {DIRECTION} {verdicts[HOLDS]} hold here, {verdicts[FAILS]} do "
+        f"not hold in our simulator, and {open_} are open or cannot be tested."
+    )
+
+
+def sentences(findings: dict[Claim, tuple[int, Finding]], directions: Counter) -> str:
+    """All of them as a list; findings : a claim's number and finding."""
+    lines = [counted(directions), *(one.text(*findings[one.claim]) for one in SENTENCES)]
+    return "".join(f"{number}. {line}\n" for number, line in enumerate(lines, start=1))
