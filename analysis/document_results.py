@@ -1,4 +1,4 @@
-"""Writes what was measured into README.md and docs/: archived runs, results/benchmark.csv, docs/validation.md.
+"""Writes what was measured into README.md and docs/: archived runs, tables of results/, docs/validation.md.
 
     python analysis/document_results.py
 
@@ -25,6 +25,7 @@ PAGES = (
     "README.md",
     "docs/learning.md",
     "docs/performance.md",
+    "docs/scaling.md",
     *(f"docs/algorithms/{name}.md" for name in (*methods.TRAINED, "heuristics")),
 )
 SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
@@ -185,6 +186,8 @@ EXCERPTS = {
     "shares": excerpts.shares,
     "towers": excerpts.towers,
     "first_run": excerpts.first_run,
+    "scaling": excerpts.scaling,
+    "boreal_map": excerpts.boreal_map,
 }
 
 
