@@ -77,7 +77,7 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_sweep_whose_workers_and_node_are_killed_has_the_same_bytes(tmp_path, monkeypatch):
-    """Two nodes of a CPU each: a script, a worker and a node are killed at random moments; a third node comes."""
+    """Two nodes of a CPU each: a script, a worker and a node are killed at random moments."""
     pytest.importorskip("ray")
     from ray.cluster_utils import Cluster
 
@@ -86,13 +86,13 @@ def test_a_sweep_whose_workers_and_node_are_killed_has_the_same_bytes(tmp_path, 
     )
     monkeypatch.setenv("TOY_SECONDS", "0.002")
     grid = ("env_id=resumable_toy:resumable-toy-v0", "total_timesteps=3000", "num_envs=2", "rollout_steps=200")
-    grid += ("eval_episodes=2", "eval_weights=0 1", "learning_rate=1e-3,3e-4")
+    grid += ("eval_episodes=2", "eval_weights=0 1")
 
     def args(name, **changes):
         folder = tmp_path / name
         return sweep.Args(
             ROOT / "cleanrl_style" / "ppo_gated.py",
-            "1-2",
+            "1-3",
             grid,
             runs_dir=folder,
             output=folder / "sweep.csv",
@@ -117,7 +117,6 @@ def test_a_sweep_whose_workers_and_node_are_killed_has_the_same_bytes(tmp_path, 
     def disturb():
         kill("script")
         kill("worker")
-        cluster.add_node(num_cpus=1, object_store_memory=80_000_000)
         cluster.remove_node(nodes[0], allow_graceful=False)
         killed.append("node")
 
