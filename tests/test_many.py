@@ -250,7 +250,7 @@ def test_gridded_climate(tmp_path):
     np.testing.assert_allclose(found.mean_annual_temperature_c, -3.0 + np.array([2, 0, 5, 3, 4]), atol=1e-9)
     np.testing.assert_allclose(found.seasonal_amplitude_c, 20.0, rtol=1e-4)
     np.testing.assert_allclose(found.relative_humidity, 0.6 + 0.01 * np.array([2, 0, 5, 3, 4]))
-    file.to_zarr(tmp_path / "climate.zarr", consolidated=False, zarr_format=2)
+    file.to_zarr(tmp_path / "climate.zarr", zarr_format=2)
     again = sim.sites_on_grid([60.0, 65.0], [-120.0, 1.0, 119.0], climate=tmp_path / "climate.zarr")
     pd.testing.assert_frame_equal(again[list(found)], found)
 
