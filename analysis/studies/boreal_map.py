@@ -76,17 +76,21 @@ def policy_of(args: Args) -> tuple[str, str, Callable]:
 
 
 def outlines() -> list[np.ndarray]:
-    """Coastlines, each (points, 2) of longitude and latitude [deg]."""
-    table = pd.read_csv(LAND)
-    return [ring[["longitude_deg", "latitude_deg"]].to_numpy() for _, ring in table.groupby("ring")]
+    """Coastlines, each (points, 2) of longitude and latitude [deg]; one that crosses 180 degrees goes on beyond it."""
+    rings = [ring for _, ring in pd.read_csv(LAND).groupby("ring")]
+    return [np.column_stack([np.unwrap(ring.longitude_deg, period=360.0), ring.latitude_deg]) for ring in rings]
 
 
 def on_land(longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
     """Whether points are on land: within an odd number of coastlines."""
     from matplotlib.path import Path as Outline
 
-    points = np.column_stack([longitude, latitude])
-    return np.sum([Outline(ring).contains_points(points) for ring in outlines()], axis=0) % 2 == 1
+    rings = [Outline(ring) for ring in outlines()]
+    inside = np.zeros(len(longitude), dtype=int)
+    for turn in (-360.0, 0.0, 360.0):
+        points = np.column_stack([longitude + turn, latitude])
+        inside += np.sum([ring.contains_points(points) for ring in rings], axis=0)
+    return inside % 2 == 1
 
 
 def axes(spacing: float) -> tuple[np.ndarray, np.ndarray]:
