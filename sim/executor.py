@@ -41,8 +41,9 @@ def each(
     if address == HERE and workers == 1:  # in this thread, so that Ctrl-C ends a task
         yield from ((number, work(task)) for number, task in enumerate(tasks))
         return
-    pool = Threads(workers) if address == HERE else Cluster(address, workers)
-    waiting, under_way = enumerate(tasks), {}
+    pool: Threads | Cluster = Threads(workers) if address == HERE else Cluster(address, workers)
+    waiting = enumerate(tasks)
+    under_way: dict[Any, int] = {}
     try:
         while True:
             for number, task in islice(waiting, max(0, pool.width() - len(under_way))):

@@ -164,6 +164,12 @@ PANELS = (
 )
 
 
+def finer(ring: np.ndarray, times: int = 30) -> np.ndarray:
+    """The same line of more points: what is straight on a plane of longitude and latitude is not from above."""
+    places = np.linspace(0, len(ring) - 1, times * (len(ring) - 1) + 1)
+    return np.column_stack([np.interp(places, np.arange(len(ring)), column) for column in ring.T])
+
+
 def projected(longitude, latitude) -> tuple[np.ndarray, np.ndarray]:
     """The world from above the pole, distances from it as they are [deg]; Greenwich is below."""
     radius, angle = 90.0 - np.asarray(latitude), np.deg2rad(longitude)
@@ -176,7 +182,7 @@ def draw(table: pd.DataFrame, spacing: float, title: str, path: Path) -> None:
 
     import matplotlib.pyplot as plt
 
-    figure, grid = plt.subplots(2, len(PANELS), figsize=(13, 6.2), layout="constrained", height_ratios=(2.6, 1))
+    figure, grid = plt.subplots(2, len(PANELS), figsize=(13, 5.8), layout="constrained", height_ratios=(2.6, 1))
     latitudes = np.unique(table.latitude_deg)
     for number, (column, label, colours, signed) in enumerate(PANELS):
         above, below = grid[:, number]
@@ -184,7 +190,7 @@ def draw(table: pd.DataFrame, spacing: float, title: str, path: Path) -> None:
         low, high = (-most, most) if signed else (0.0, 1.0 if column == "conifer_share" else most)
         outline = plt.Circle((0.0, 0.0), 90.0 - LOWEST_LATITUDE, transform=above.transData)
         for ring in outlines():
-            (land,) = above.fill(*projected(*ring.T), color="#e9e6e0", linewidth=0)
+            (land,) = above.fill(*projected(*finer(ring).T), color="#e9e6e0", linewidth=0)
             land.set_clip_path(outline)
         cells = cell_values(table, column, spacing)
         image = above.pcolormesh(*cells, cmap=colours, vmin=low, vmax=high, rasterized=True)

@@ -55,7 +55,7 @@ def climate_at(climate, latitude: np.ndarray, longitude: np.ndarray) -> pd.DataF
         opened = xarray.open_zarr if Path(climate).is_dir() else xarray.open_dataset
         with opened(climate) as file:
             return climate_at(file, latitude, longitude)
-    axes = {}
+    axes: dict[str, str] = {}
     for name, names in AXES.items():
         found = [one for one in names if one in climate.coords and climate[one].ndim == 1]
         if not found:
@@ -64,7 +64,7 @@ def climate_at(climate, latitude: np.ndarray, longitude: np.ndarray) -> pd.DataF
     grid = climate.rename(axes)
     grid = grid.assign_coords({LONGITUDE: wrapped(grid[LONGITUDE])}).sortby([LATITUDE, LONGITUDE])
     points = {LATITUDE: ("point", latitude), LONGITUDE: ("point", wrapped(longitude))}
-    columns = {}
+    columns: dict[str, np.ndarray] = {}
     for name in grid.data_vars:
         if name not in COLUMNS and name != MONTHLY or name in (SEED, LATITUDE, LONGITUDE):
             allowed = ", ".join(column for column in COLUMNS if column not in (SEED, LATITUDE, LONGITUDE))

@@ -412,9 +412,11 @@ class Store:
             "variables": list(plan.variables),
             "arguments": {name: without_addresses(value) for name, value in sorted(plan.arguments.items())},
         }
-        self.path = None if path is None else Path(path)
-        self.partial = None if self.path is None else self.path.with_name(self.path.name + ".partial")
-        self.overwrite, self.lock = overwrite, None
+        self.path: Any = None if path is None else Path(path)
+        self.partial: Any = None if path is None else self.path.with_name(self.path.name + ".partial")
+        self.overwrite = overwrite
+        self.group: Any = None
+        self.lock: Any = None
         self.waiting = list(range(plan.chunks))
 
     def __enter__(self) -> "Store":
