@@ -1,4 +1,4 @@
-"""Writes what was measured into README.md and docs/: archived runs, results/benchmark.csv, docs/validation.md.
+"""Writes what was measured into README.md and docs/: archived runs, tables of results/, docs/validation.md.
 
     python analysis/document_results.py
 
@@ -25,6 +25,7 @@ PAGES = (
     "README.md",
     "docs/learning.md",
     "docs/performance.md",
+    "docs/scaling.md",
     "docs/outside.md",
     *(f"docs/algorithms/{name}.md" for name in methods.scripts(methods.CONDITIONED, methods.FIXED_WEIGHT)),
     "docs/algorithms/heuristics.md",
@@ -206,6 +207,8 @@ EXCERPTS = {
     "shares": excerpts.shares,
     "towers": excerpts.towers,
     "first_run": excerpts.first_run,
+    "scaling": excerpts.scaling,
+    "boreal_map": excerpts.boreal_map,
 }
 
 

@@ -1,12 +1,13 @@
-"""What README.md and docs/performance.md show of results/first_run.txt, results/benchmark.csv and docs/validation.md,
-as Markdown."""
+"""What README.md, docs/performance.md and docs/scaling.md show of the files of results/ and of docs/validation.md, as
+Markdown."""
 
 import re
 from pathlib import Path
 
 import pandas as pd
 
-from analysis import paths
+from analysis import paths, stored
+from analysis.studies import boreal_map as region_map
 from cleanrl_style import protocol
 
 VALIDATION = Path("docs/validation.md")
@@ -64,6 +65,50 @@ def shares() -> str:
     times = figures([f"lockstep, 32 stands: {part}" for part in SHARES])["median"]
     rows = zip(SHARES.values(), 100 * times / times.sum(), strict=True)
     return markdown(["what", "share of a lockstep training"], [[what, f"{share:.0f} %"] for what, share in rows])
+
+
+def scaling() -> str:
+    """How speed grows with stands and cores, and what a region costs; results/scaling.csv has it."""
+    path = paths.results() / "scaling.csv"
+    if not path.exists():
+        return "Not measured yet.\n"
+    table = pd.read_csv(path)
+    years = table[table.what == "a year"]
+    header, columns = ["stands"], []
+    for (backend, threads), group in years.groupby(["backend", "threads"], sort=False):
+        cores = "GPU" if backend == "cuda" else "1 core" if threads == 1 else f"{threads} cores"
+        header += [f"{cores}: stand-years/s", "of its best"] + (["of a core's alone"] if threads > 1 else [])
+        columns.append(group.set_index("stands"))
+    rows = []
+    for stands in dict.fromkeys(years.stands):
+        cells = [f"{stands:,}"]
+        for column, group in zip(columns, years.groupby(["backend", "threads"], sort=False).groups, strict=True):
+            row = column.loc[stands]
+            cells += [f"{row['median']:,.0f}", f"{row['median'] / column['median'].max():.0%}"]
+            cells += [f"{row.efficiency:.0%}"] if group[1] > 1 else []
+        rows.append(cells)
+    text = markdown(header, rows)
+    region = table[table.what.str.contains("stands, ")]
+    costs = {
+        backend: "; ".join(
+            f"{row.median_:,.0f} {row.unit} ({row.low:,.0f}-{row.high:,.0f})"
+            for row in group.rename(columns={"median": "median_"}).itertuples()
+        )
+        for backend, group in region.groupby("backend", sort=False)
+    }
+    what = region.what.iloc[0].replace("1000000", "a million")
+    lines = (f"- {what}, {'on GPUs' if name == 'cuda' else 'on cores'}: {cost}" for name, cost in costs.items())
+    return text + "\n" + "\n".join(lines) + f"\n\nMeasured on {table.machine.iloc[0]}.\n"
+
+
+def boreal_map() -> str:
+    """What the map says; results/studies/boreal_map.csv has it."""
+    path = paths.studies() / "boreal_map.csv"
+    if not path.exists():
+        return "Not drawn yet.\n"
+    settings = stored.settings(path)
+    answer = region_map.sentences(stored.read(path), settings["preference"], settings["years"])
+    return f"![What the policy plants, and what that does](images/boreal_map.png)\n\n{answer}\n"
 
 
 def first_run() -> str:

@@ -23,6 +23,12 @@ def read(path: Path, text: tuple[str, ...] = ()) -> pd.DataFrame:
     return table
 
 
+def settings(path: Path) -> dict:
+    """The settings that made a table."""
+    with path.open(encoding="utf-8") as file:
+        return json.loads(file.readline().removeprefix("#"))
+
+
 def is_finished(path: Path, settings: dict) -> bool:
     """Whether the table is there and was made with these settings."""
     if not path.exists():

@@ -1,9 +1,12 @@
 """The simulator of a boreal stand: energy, water, carbon, demography, disturbance and management.
 
-`simulate` runs one stand and returns a table; `read_forcing` makes its weather of a tower's file. `Stands` steps many,
-for the environment. `sample_site` draws the parameters of a site. `docs/simulator.md` shows how to use it,
+`simulate` runs one stand and returns a table; `read_forcing` makes its weather of a tower's file. `simulate_many` runs
+one on each of many sites, `sites_on_grid` makes those of a region. `Stands` steps many, for the environment.
+`sample_site` draws the parameters of a site. `docs/simulator.md` shows how to use it,
 `docs/model.md` has the equations.
 """
+
+from importlib import import_module
 
 from sim.closure import PhysicsError
 from sim.draws import Seeds, episode_seeds
@@ -46,4 +49,16 @@ __all__ = [
     "sample_site",
     "scale_site",
     "simulate",
+    "simulate_many",
+    "sites_on_grid",
 ]
+
+
+#: What needs the task, whose observations a policy sees: name -> its file, loaded when it is asked for.
+_OF_THE_TASK = {"simulate_many": "sim.task.many", "sites_on_grid": "sim.task.grid"}
+
+
+def __getattr__(name: str):
+    if name in _OF_THE_TASK:
+        return getattr(import_module(_OF_THE_TASK[name]), name)
+    raise AttributeError(f"module 'sim' has no attribute {name!r}")

@@ -1,6 +1,4 @@
 import json
-import os
-import signal
 from collections import Counter
 from pathlib import Path
 
@@ -10,7 +8,6 @@ from tiny_runs import TINY_RUNS
 
 import boreal_env
 from analysis import experiments, methods, reproduce, runs
-from analysis.experiments import Job
 from cleanrl_style import protocol
 from cleanrl_style.ppo_gated import Args
 
@@ -115,98 +112,6 @@ def test_list_prints_the_commands(capsys):
         "python cleanrl_style/ppo_gated.py --seed 3 --vectorization lockstep --thaw-formulation contrast",
         "python cleanrl_style/ppo_gated.py --seed 3 --vectorization lockstep --thaw-formulation raw_degree_days",
     ]
-
-
-# --------------------------------------------------------------------------------------- the runner
-
-FAKE = """
-import os, pathlib, sys, time
-name, what = sys.argv[2], sys.argv[4]
-marks = pathlib.Path(sys.argv[6])
-(marks / f"{name} started").touch()
-if hasattr(os, "sched_getaffinity"):
-    assert len(os.sched_getaffinity(0)) == 1
-print("training 40/100 steps", flush=True)
-if what == "fails":
-    sys.exit("error: this one fails")
-if what == "waits":
-    time.sleep(60)
-if what == "is slow":
-    time.sleep(1)
-if what == "reads a":
-    assert (marks / "a done").exists()
-(marks / f"{name} done").touch()
-"""
-
-
-@pytest.fixture
-def fake(tmp_path, monkeypatch):
-    """Makes jobs of a script that fails, waits or ends, and a function of a job that says whether it has ended."""
-    script = tmp_path / "fake.py"
-    script.write_text(FAKE)
-    monkeypatch.setattr(Job, "path", property(lambda self: str(script)))
-    monkeypatch.setattr(Job, "steps", property(lambda self: 100))
-
-    def job(name, what="ends"):
-        return Job("main", "fake", {"name": name, "what": what, "marks": tmp_path})
-
-    def finished(job):
-        return (tmp_path / f"{job.flags['name']} done").exists()
-
-    return job, finished, tmp_path
-
-
-def run(jobs, fake, cores=(0, 1)):
-    known = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [0]
-    return reproduce.run_jobs(jobs, fake[2] / "logs", known[: len(cores)], fake[1], poll=0.02)
-
-
-def test_a_failed_job_is_named_and_the_rest_goes_on(fake, capsys):
-    job = fake[0]
-    failed = run([job("a"), job("b", "fails"), job("c"), job("d")], fake)
-    out = capsys.readouterr().out
-    assert [one.flags["name"] for one in failed] == ["b"]
-    assert "FAILED: python" in out and "--name b --what fails" in out and "error: this one fails" in out
-    assert "3/4 jobs, 300 of 300 steps" in out
-    assert all((fake[2] / f"{name} done").exists() for name in "acd")
-
-
-def test_a_study_that_reads_runs_starts_when_those_before_it_have_ended(fake, monkeypatch):
-    monkeypatch.setattr(experiments, "READING", ("reader",))
-    reader = Job("main", "reader", {"name": "b", "what": "reads a", "marks": fake[2]})
-    assert run([fake[0]("a", "is slow"), reader, fake[0]("c")], fake) == []
-    assert fake[1](reader)
-
-
-def test_finished_jobs_are_not_started_again(fake, capsys):
-    job = fake[0]
-    run([job("a"), job("b", "fails")], fake)
-    for path in fake[2].glob("* started"):
-        path.unlink()
-    assert run([job("a"), job("b")], fake) == []
-    assert [path.name for path in fake[2].glob("* started")] == ["b started"]
-    assert "2/2 jobs, 200 of 200 steps" in capsys.readouterr().out
-
-
-def test_stopping_ends_the_children(fake, monkeypatch):
-    begun = []
-
-    def start(*args):
-        begun.append(true_start(*args))
-        return begun[-1]
-
-    def sleep(seconds):
-        true_sleep(seconds)
-        if begun[0].log.exists() and begun[0].steps() == 40:
-            monkeypatch.setattr(reproduce.time, "sleep", true_sleep)  # waiting for the process sleeps too
-            raise KeyboardInterrupt
-
-    true_start, true_sleep = reproduce.start, reproduce.time.sleep
-    monkeypatch.setattr(reproduce, "start", start)
-    monkeypatch.setattr(reproduce.time, "sleep", sleep)
-    with pytest.raises(KeyboardInterrupt):
-        run([fake[0]("a", "waits")], fake)
-    assert begun[0].process.returncode == -signal.SIGTERM
 
 
 def test_finished_runs_are_recognised(tmp_path):

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import sim
-from analysis import scaling
+from analysis import excerpts, scaling
 from sim.task.actions import NO_CHANGE
 
 
-def test_a_row_a_figure_and_the_region_at_the_best_speed():
+def test_a_row_a_figure_and_the_region_at_the_best_speed(tmp_path, monkeypatch):
     table = scaling.run(scaling.Args(stands=(1, 2), threads=(1,), environments=2, repeats=1, dollars_per_core_hour=0.5))
     assert tuple(table.columns) == scaling.COLUMNS
     table = table[table.backend == "numba"]
@@ -18,6 +18,12 @@ def test_a_row_a_figure_and_the_region_at_the_best_speed():
     hours, dollars = (table.loc[table.unit == unit, "median"].item() for unit in ("core-hours", "dollars"))
     assert hours == pytest.approx(1e6 * 52 / speeds["median"][speeds.what == "a year"].max() / 3600)
     assert dollars == 0.5 * hours
+    (tmp_path / "results").mkdir()
+    table.to_csv(tmp_path / "results" / "scaling.csv", index=False)
+    monkeypatch.chdir(tmp_path)
+    lines = excerpts.scaling().splitlines()
+    assert lines[0] == "| stands | 1 core: stand-years/s | of its best |" and lines[2].startswith("| 1 | ")
+    assert any(line.startswith("- a million stands, 50 years, on cores: ") and "dollars" in line for line in lines)
 
 
 def test_repeated_stands_go_on_as_those_they_repeat():

@@ -153,9 +153,10 @@ class Episodes:
         site_seed, episode_seed = int(generator.integers(2**31)), int(generator.integers(2**62))
         return site_seed, episode_seed, draw_weights(generator, len(self.objective_names))
 
-    def begin(self, indices, draws, preferences, sites) -> None:
-        """Start episodes. draws : for each, `draw`'s result; preferences (weights), sites : for each, or None."""
-        chosen, seeds, given = [], [], {}
+    def begin(self, indices, draws, preferences, sites, initial=None) -> None:
+        """Start episodes. draws : for each, `draw`'s result; preferences (weights), sites : for each, or None;
+        initial : as of `sim.Stands.start`."""
+        chosen, seeds, given = [], [], dict(initial or {})
         for k, i in enumerate(indices):
             site_seed, episode_seed, weights = draws[k]
             overrides = {**self.parameter_overrides, **(sites[k] or {})}

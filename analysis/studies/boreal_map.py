@@ -1,0 +1,256 @@
+"""What a policy plants over the boreal zone, and what that does to thaw depth and carbon against doing nothing.
+
+    python analysis/studies/boreal_map.py --policy runs/ppo_group/boreal-balanced-v0-vectorization=lockstep/seed1
+
+A stand on every land point of a grid over the latitudes that sites are sampled from, simulated twice by
+`sim.simulate_many`, with and without the policy, under the same weather and dice. Climate follows latitude as for
+sampled sites, and all else is sampled; `--climate` takes a gridded file instead, and then every land point that it has.
+Leaves results/studies/boreal_map.csv, a row a point, and docs/images/boreal_map.png. The simulations are kept in
+runs/boreal_map, and the same command goes on where it was killed.
+"""
+
+import importlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+
+import boreal_env
+import sim
+from analysis import paths, stored
+from cleanrl_style import protocol
+from sim.executor import HERE
+from sim.management import decode
+
+BALANCED = "boreal-balanced-v0"
+LAST = 10  # years that thaw depth is a mean of
+LAND = Path(__file__).parents[1] / "observations" / "natural_earth_land_110m.csv.gz"
+FIGURE = Path("docs/images/boreal_map.png")
+FIRST_SEED = 5_000_000_000  # of the points' sites and dice: beyond those of training and evaluation
+VARIABLES = ("planted_stems_ha", "net_carbon_change_kgc_m2", "active_layer_depth_m")
+POINT = ["latitude_deg", "longitude_deg"]
+LOWEST_LATITUDE = 48.0  # that is drawn
+
+
+@dataclass
+class Args:
+    """Maps what a policy plants, and what that does."""
+
+    policy: str
+    """folder of a finished run, or a fixed strategy of baselines_heuristic, such as plus_100"""
+    preference: float = 0.5
+    """weight of carbon"""
+    env_id: str | None = None
+    """world of the stands (None: the run's; of a fixed strategy boreal-balanced-v0)"""
+    climate: Path | None = None
+    """NetCDF file or zarr store of gridded climate (None: by latitude), see sim.sites_on_grid"""
+    spacing: float = 0.5
+    """of the grid, degrees of latitude; of longitude twice as many"""
+    years: int = 50
+    """length of the simulations"""
+    address: str = HERE
+    """where: "none", all cores of this machine; "local", Ray on it; or the address of a Ray cluster"""
+    quick: bool = False
+    """a spacing of 4 degrees and 3 years, into results/quick/studies"""
+
+
+def policy_of(args: Args) -> tuple[str, str, Callable]:
+    """Name, environment and function of a policy."""
+    folder = Path(args.policy)
+    if (folder / "config.json").exists():
+        import torch
+
+        torch.set_num_threads(1)  # sums are in one order, whatever the machine; the network is small
+        config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+        seed, env_id = config["arguments"]["seed"], config["arguments"]["env_id"]
+        return f"{config['script']}-seed{seed}", args.env_id or env_id, protocol.load_agent(folder)
+    try:
+        module = importlib.import_module(f"baselines_heuristic.{args.policy}")
+    except ModuleNotFoundError:
+        protocol.fail(f"--policy {args.policy}: neither a run's folder nor a fixed strategy")
+    return args.policy, args.env_id or BALANCED, module.policy
+
+
+def outlines() -> list[np.ndarray]:
+    """Coastlines, each (points, 2) of longitude and latitude [deg]; one that crosses 180 degrees goes on beyond it."""
+    rings = [ring for _, ring in pd.read_csv(LAND).groupby("ring")]
+    return [np.column_stack([np.unwrap(ring.longitude_deg, period=360.0), ring.latitude_deg]) for ring in rings]
+
+
+def on_land(longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
+    """Whether points are on land: within an odd number of coastlines."""
+    from matplotlib.path import Path as Outline
+
+    rings = [Outline(ring) for ring in outlines()]
+    inside = np.zeros(len(longitude), dtype=int)
+    for turn in (-360.0, 0.0, 360.0):
+        points = np.column_stack([longitude + turn, latitude])
+        inside += np.sum([ring.contains_points(points) for ring in rings], axis=0)
+    return inside % 2 == 1
+
+
+def axes(spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Latitudes and longitudes of the grid's points."""
+    sampled = sim.SITE_PARAMETERS["latitude_deg"]
+    return (
+        np.arange(sampled.low + spacing / 2, sampled.high, spacing),
+        np.arange(-180.0 + spacing, 180.0, 2.0 * spacing),
+    )
+
+
+def sites(args: Args) -> pd.DataFrame:
+    """The stands of the map."""
+    table = sim.sites_on_grid(*axes(args.spacing), climate=args.climate)
+    return table[on_land(table.longitude_deg, table.latitude_deg)].reset_index(drop=True)
+
+
+def study(args: Args, name: str, world: dict, policy: Callable, folder: Path) -> pd.DataFrame:
+    """A row a point: what was planted there [stems ha-1 yr-1], the share of conifers in it, and thaw depth [m] and
+    carbon [kgC m-2] at the end, less those without the policy."""
+    shared = {
+        "years": args.years,
+        "seed": FIRST_SEED,
+        "others": "sampled",
+        "preference": args.preference,
+        "variables": VARIABLES,
+        "address": args.address,
+        **world,
+    }
+    where = f"{args.spacing:g}deg-{args.years}years-{'climate' if args.climate else 'latitude'}.zarr"
+    places = sites(args)
+    print(f"{len(places):,} stands, with the policy and without", flush=True)
+    acted = sim.simulate_many(places, policy, path=folder / f"{name}-{args.preference:g}-{where}", **shared)
+    left = sim.simulate_many(places, path=folder / f"nothing-{args.preference:g}-{where}", **shared)
+    planted = acted.planted_stems_ha.to_numpy().astype(float)
+    conifers = (planted * decode(acted.action.to_numpy())[1]).sum(axis=1)
+    thaw, carbon = (
+        (acted[variable] - left[variable]).to_numpy().astype(float)
+        for variable in ("active_layer_depth_m", "net_carbon_change_kgc_m2")
+    )
+    table = places[POINT].assign(
+        planted_stems_ha_yr=planted.mean(axis=1),
+        conifer_share=np.divide(
+            conifers, planted.sum(axis=1), where=planted.any(axis=1), out=np.full(len(planted), np.nan)
+        ),
+        thaw_depth_change_m=thaw[:, -LAST:].mean(axis=1),
+        carbon_change_kgc_m2=carbon.sum(axis=1),
+    )
+    return table.round(4)
+
+
+def sentences(table: pd.DataFrame, preference: float, years: int) -> str:
+    """The answer."""
+    planted, mean = table.planted_stems_ha_yr, table.mean()
+    conifers = (planted * table.conifer_share).sum() / max(planted.sum(), 1e-9)
+    thaw, carbon = mean.thaw_depth_change_m, mean.carbon_change_kgc_m2
+    shallower = (table.thaw_depth_change_m < 0).mean()
+    return (
+        f"At a carbon weight of {preference:g} the policy plants {planted.mean():.0f} stems/ha a year, {conifers:.0%} "
+        f"of them conifers. After {years} years thaw is {abs(thaw):.2f} m {'shallower' if thaw < 0 else 'deeper'} than "
+        f"without it, as a mean of {len(table):,} stands ({shallower:.0%} of them thaw less deep), and a stand has "
+        f"{abs(carbon):.1f} kgC/m2 {'more' if carbon > 0 else 'less'}."
+    )
+
+
+PANELS = (
+    ("planted_stems_ha_yr", "planted, stems/ha a year", "YlGn", False),
+    ("conifer_share", "conifers among the planted", "BrBG", False),
+    ("thaw_depth_change_m", "thaw depth, m against doing nothing", "RdBu_r", True),
+    ("carbon_change_kgc_m2", "carbon, kgC/m2 against doing nothing", "PuOr_r", True),
+)
+
+
+def finer(ring: np.ndarray, times: int = 30) -> np.ndarray:
+    """The same line of more points: what is straight on a plane of longitude and latitude is not from above."""
+    places = np.linspace(0, len(ring) - 1, times * (len(ring) - 1) + 1)
+    return np.column_stack([np.interp(places, np.arange(len(ring)), column) for column in ring.T])
+
+
+def projected(longitude, latitude) -> tuple[np.ndarray, np.ndarray]:
+    """The world from above the pole, distances from it as they are [deg]; Greenwich is below."""
+    radius, angle = 90.0 - np.asarray(latitude), np.deg2rad(longitude)
+    return radius * np.sin(angle), -radius * np.cos(angle)
+
+
+def draw(table: pd.DataFrame, spacing: float, title: str, path: Path) -> None:
+    """A map of each column from above the pole, and below it the same by latitude."""
+    import textwrap
+
+    import matplotlib.pyplot as plt
+
+    figure, grid = plt.subplots(2, len(PANELS), figsize=(13, 5.8), layout="constrained", height_ratios=(2.6, 1))
+    latitudes = np.unique(table.latitude_deg)
+    for number, (column, label, colours, signed) in enumerate(PANELS):
+        above, below = grid[:, number]
+        most = np.nanpercentile(np.abs(table[column]), 97) or 1.0
+        low, high = (-most, most) if signed else (0.0, 1.0 if column == "conifer_share" else most)
+        outline = plt.Circle((0.0, 0.0), 90.0 - LOWEST_LATITUDE, transform=above.transData)
+        for ring in outlines():
+            (land,) = above.fill(*projected(*finer(ring).T), color="#e9e6e0", linewidth=0)
+            land.set_clip_path(outline)
+        cells = cell_values(table, column, spacing)
+        image = above.pcolormesh(*cells, cmap=colours, vmin=low, vmax=high, rasterized=True)
+        figure.colorbar(image, ax=above, orientation="horizontal", shrink=0.8, pad=0.02, label=label)
+        reach = 90.0 - LOWEST_LATITUDE
+        above.set(aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
+        above.axis("off")
+        by_latitude = table.groupby("latitude_deg")[column]
+        bands = [by_latitude.quantile(share) for share in (0.1, 0.5, 0.9)]
+        below.fill_between(latitudes, bands[0], bands[2], color="#777777", alpha=0.25, linewidth=0)
+        below.plot(latitudes, bands[1], color="#222222", lw=1.5)
+        if signed:
+            below.axhline(0.0, color="#999999", lw=0.8)
+        below.set(xlabel="latitude, degN", xlim=(latitudes[0], latitudes[-1]))
+        below.spines[["top", "right"]].set_visible(False)
+    grid[1, 0].set_ylabel("median, and\n80 % of the stands")
+    figure.suptitle(textwrap.fill(title, 150), fontsize=10)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=150, metadata={"Software": None})
+    plt.close(figure)
+
+
+def cell_values(table: pd.DataFrame, column: str, spacing: float):
+    """A column on the whole grid: projected corners of the cells, and their values, missing where no stand is."""
+    latitudes, longitudes = axes(spacing)
+    values = np.full((len(latitudes), len(longitudes)), np.nan)
+    rows = np.searchsorted(latitudes, table.latitude_deg - 1e-6)
+    values[rows, np.searchsorted(longitudes, table.longitude_deg - 1e-6)] = table[column]
+    corners = (
+        np.append(axis - step / 2, axis[-1] + step / 2)
+        for axis, step in ((longitudes, 2.0 * spacing), (latitudes, spacing))
+    )
+    return *projected(*np.meshgrid(*corners)), np.ma.masked_invalid(values)
+
+
+def main(args: Args) -> None:
+    """Simulate, and write table and figure."""
+    if args.quick:
+        args.spacing, args.years = 4.0, 3
+    name, env_id, policy = policy_of(args)
+    if env_id not in boreal_env.REGISTERED:
+        protocol.fail(f"--env-id {env_id}: allowed are {', '.join(boreal_env.REGISTERED)}")
+    world = {key: value for key, value in gym.spec(env_id).kwargs.items() if key != "mode"}
+    table = study(args, name, world, policy, paths.runs(args.quick) / "boreal_map")
+    path = paths.studies(args.quick) / "boreal_map.csv"
+    settings = {
+        "policy": name,
+        "env_id": env_id,
+        "preference": args.preference,
+        "climate": None if args.climate is None else args.climate.name,
+        "spacing": args.spacing,
+        "years": args.years,
+    }
+    stored.write(path, table, settings)
+    title = sentences(table, args.preference, args.years)
+    print(title)
+    figure = path.with_suffix(".png") if args.quick else FIGURE
+    draw(table, args.spacing, title, figure)
+    print(f"wrote {path} and {figure}")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

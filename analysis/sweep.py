@@ -1,0 +1,223 @@
+"""Trains a script under every combination of settings and seeds, on this machine or on a Ray cluster; one table of all.
+
+    python analysis/sweep.py cleanrl_style/ppo_group.py --seeds 1-10 --grid learning_rate=1e-4,3e-4
+    python analysis/sweep.py ... --address auto          on the Ray cluster that this machine belongs to
+    python analysis/sweep.py ... --part 3/10             every tenth run from the third on (analysis/slurm_array.sh)
+
+One process a core. A finished run is not started again; one that is killed, with its worker, node or this command, goes
+on from its checkpoint. When all are finished, a row a run is in `--output`, and a row a setting is printed.
+"""
+
+import dataclasses
+import importlib.util
+import itertools
+import re
+import signal
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import tyro
+
+from analysis import archive, commands, paths, runs
+from analysis.tables.common import over_seeds, readable
+from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts
+from sim.block import LANES, lanes_for
+from sim.executor import HERE, RAY_HERE, check_address, default_address
+
+OURS = ("seed", "run_dir", "overwrite")  # arguments of a script that are no setting
+
+
+@dataclass
+class Args:
+    """Trains a script under every combination of settings and seeds, and makes one table of all runs."""
+
+    script: Annotated[Path, tyro.conf.Positional]
+    """script to train: one of cleanrl_style/, or a copy of one"""
+    seeds: str = "1-5"
+    """training seeds, such as 1-10 or 1,3,7-9"""
+    grid: tuple[str, ...] = ()
+    """settings, flag=value or flag=value,value; of a flag that takes several numbers "flag=1 0.5,1 1" """
+    address: str = dataclasses.field(default_factory=default_address)
+    """where: "local", Ray on this machine; "auto" or host:port, a Ray cluster that is there; "none", without Ray"""
+    workers: int | None = None
+    """runs at a time on this machine (None: one a core)"""
+    part: str = "1/1"
+    """k/n: every nth run from the kth on, for job arrays"""
+    runs_dir: Path = paths.runs()
+    """folder of the runs; of a cluster, one that all its nodes see"""
+    output: Path = paths.runs() / "sweep.csv"
+    """table of the runs"""
+    list: bool = False
+    """print the commands and stop"""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of the sweep: its settings as they were given, its seed, its folder and what makes it."""
+
+    settings: dict[str, str]
+    seed: int
+    folder: Path
+    command: commands.Command
+    lanes: set[int]  # of the kernels that it needs on a core
+
+    @property
+    def finished(self) -> bool:
+        """Whether it need not be run."""
+        return runs.is_finished(self.folder)
+
+
+def numbers(text: str) -> list[int]:
+    """1-3,7 as 1, 2, 3, 7."""
+    found = []
+    for part in text.split(","):
+        match = re.fullmatch(r"(\d+)(?:-(\d+))?", part)
+        if match is None:
+            protocol.fail(f"--seeds {text}: numbers and ranges are allowed, such as 1-10 or 1,3,7-9")
+        found += range(int(match[1]), int(match[2] or match[1]) + 1)
+    if not found or len(set(found)) < len(found):
+        protocol.fail(f"--seeds {text}: at least one, and each once, is allowed")
+    return found
+
+
+def arguments_of(script: Path) -> type:
+    """The class `Args` of a script."""
+    if not script.is_file():
+        protocol.fail(f"{script}: no script there")
+    spec = importlib.util.spec_from_file_location(script.stem, script)
+    module = sys.modules[script.stem] = importlib.util.module_from_spec(spec)  # where its help texts are looked for
+    spec.loader.exec_module(module)
+    if not hasattr(module, "Args"):
+        protocol.fail(f"{script}: no class Args, which the arguments of a training script are")
+    return module.Args
+
+
+def settings_of(grid: tuple[str, ...], fields: dict[str, dataclasses.Field]) -> list[dict[str, str]]:
+    """Every combination of the grid's settings, the last varying first."""
+    axes = {}
+    for axis in grid:
+        name, equals, values = axis.partition("=")
+        name = name.removeprefix("--").replace("-", "_")
+        if name not in fields or name in OURS:
+            allowed = ", ".join(field for field in fields if field not in OURS)
+            protocol.fail(f"--grid {axis}: unknown flag {name!r}; allowed: {allowed}")
+        if not equals or not all(values.split(",")) or name in axes:
+            protocol.fail(f"--grid {axis}: each flag once, as flag=value or flag=value,value, is allowed")
+        axes[name] = values.split(",")
+    return [dict(zip(axes, chosen, strict=True)) for chosen in itertools.product(*axes.values())]
+
+
+def words_of(settings: dict[str, str], fields: dict[str, dataclasses.Field]) -> list[str]:
+    """Settings as on the command line."""
+    words = []
+    for name, value in settings.items():
+        flag = name.replace("_", "-")
+        if fields[name].type is bool and value.lower() in ("true", "false"):
+            words.append(f"--{flag}" if value.lower() == "true" else f"--no-{flag}")
+        else:
+            words += [f"--{flag}", *value.split()]
+    return words
+
+
+def all_runs(args: Args) -> list[Run]:
+    """The sweep's runs, a seed of all settings before the next; a bad setting ends the script with one line."""
+    arguments = arguments_of(args.script)
+    fields = {field.name: field for field in dataclasses.fields(arguments)}
+    found = []
+    for seed, settings in itertools.product(numbers(args.seeds), settings_of(args.grid, fields)):
+        words = ["--seed", str(seed), *words_of(settings, fields)]
+        given, sys.argv = sys.argv, [str(args.script), *words]
+        try:
+            one = protocol.parse(arguments)
+        finally:
+            sys.argv = given
+        task = protocol.make_task(one)
+        config = {"script": args.script.stem, "arguments": vars(one), "not_default": protocol.not_default(one)}
+        folder = archive.folder_of(config, args.runs_dir.resolve())
+        log = args.runs_dir / "logs" / f"{'-'.join(folder.relative_to(args.runs_dir.resolve()).parts)}.log"
+        command = commands.Command(
+            (str(args.script.resolve()), *words, "--run-dir", str(folder)), log, getattr(one, "total_timesteps", 0)
+        )
+        lanes = {lanes_for(one.num_envs, 1), LANES} if task.boreal else set()
+        found.append(Run(settings, seed, folder, command, lanes))
+    if len({run.folder for run in found}) < len(found):
+        protocol.fail("--grid: two of its combinations are the same run")
+    return found
+
+
+def part_of(found: list[Run], part: str) -> list[Run]:
+    """Every nth run from the kth on, for "k/n"."""
+    match = re.fullmatch(r"(\d+)/(\d+)", part)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        protocol.fail(f"--part {part}: k/n with k from 1 to n is allowed")
+    return found[int(match[1]) - 1 :: int(match[2])]
+
+
+def returns(run: Run) -> dict[str, float]:
+    """Mean returns over the evaluation's weights and episodes, the scalarised one first."""
+    evaluation = runs.read_run(run.folder).evaluation
+    columns = ["scalarized_return", *fronts.return_columns(fronts.objectives_of(evaluation.columns))]
+    return evaluation[columns].mean().to_dict()
+
+
+def table_of(found: list[Run]) -> pd.DataFrame:
+    """A row a run: settings, seed, returns."""
+    return pd.DataFrame([{**run.settings, "seed": run.seed, **returns(run)} for run in found])
+
+
+def summary(table: pd.DataFrame, settings: list[str]) -> pd.DataFrame:
+    """A row a setting as text: interquartile means over its seeds, with 95 % intervals; the best first."""
+    values = [name for name in table if name not in (*settings, "seed")]
+    rows = []
+    for key, group in table.groupby(settings, sort=False) if settings else [((), table)]:
+        rows.append({**dict(zip(settings, key, strict=True)), "seeds": len(group), **over_seeds(group[values])})
+    best = pd.DataFrame(rows).sort_values("scalarized_return", ascending=False, kind="stable")
+    best["seeds"] = best.seeds.astype(str)
+    return readable(best, {name: name for name in (*settings, "seeds", *values)})
+
+
+def main(args: Args) -> None:
+    """Run what is not finished, and make the table when all is."""
+    found = all_runs(args)
+    mine = part_of(found, args.part)
+    if args.list:
+        print("\n".join(str(run.command) for run in mine))
+        return
+    try:
+        check_address(args.address)
+    except ValueError as error:
+        protocol.fail(f"--{error}")
+    waiting = [run for run in mine if not run.finished]
+    where = {HERE: "processes of this machine", RAY_HERE: "Ray on this machine"}.get(
+        args.address, f"the Ray cluster at {args.address}"
+    )
+    print(f"{len(mine)} runs, {len(mine) - len(waiting)} of them finished; the others by {where}", flush=True)
+    if waiting:
+        if lanes := set().union(*(run.lanes for run in waiting)):
+            protocol.compile_physics(sorted(lanes))
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        try:
+            words = [run.command for run in waiting]
+            failed = commands.run_all(words, len(mine), address=args.address, workers=args.workers)
+        except KeyboardInterrupt:
+            sys.exit("\nstopped; the same command goes on from here")
+        if failed:
+            sys.exit("failed, try the same command again:\n" + "\n".join(f"  {one}" for one in failed))
+    unfinished = sum(not run.finished for run in found)
+    if unfinished:
+        print(f"{unfinished} runs of other parts are not finished; the table comes when they are")
+        return
+    table = table_of(found)
+    args.output.parent.mkdir(parents=True, exist_ok=True)
+    with protocol.replacing(args.output) as file:
+        table.to_csv(file, index=False, float_format=protocol.FLOAT_FORMAT, lineterminator="\n")
+    print(summary(table, list(found[0].settings)).to_string(index=False))
+    print(f"wrote {args.output}")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

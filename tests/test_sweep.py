@@ -1,0 +1,123 @@
+"""A sweep's runs, their table, and what of it a job array does."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from scripts import ROOT
+from tiny_runs import write_run
+
+from analysis import commands, sweep
+
+SCRIPT = ROOT / "cleanrl_style" / "ppo_group.py"
+
+
+def args(folder, seeds="1-2", grid=("learning_rate=1e-4,3e-4",), **changes):
+    return sweep.Args(SCRIPT, seeds, tuple(grid), "none", runs_dir=folder, output=folder / "sweep.csv", **changes)
+
+
+def finish(runs, shift=0.0):
+    """Runs as if they had been trained; those of the larger learning rate are better by 1."""
+    for run in runs:
+        better = float(run.settings.get("learning_rate") == "3e-4") + 0.1 * run.seed + shift
+        write_run(run.folder, "ppo_group", seed=run.seed, carbon=(better,) * 3, thaw=(better,) * 3)
+
+
+def test_every_combination_a_seed_of_all_before_the_next(tmp_path):
+    runs = sweep.all_runs(
+        args(tmp_path, "1-2,7", ["learning-rate=1e-4,3e-4", "gae_lambda=0.9 1,0.8", "hide_site=True"])
+    )
+    assert len(runs) == 12 and [run.seed for run in runs] == [1] * 4 + [2] * 4 + [7] * 4
+    assert runs[0].settings == {"learning_rate": "1e-4", "gae_lambda": "0.9 1", "hide_site": "True"}
+    words = " ".join(runs[0].command.words[1:])
+    assert words.startswith("--seed 1 --learning-rate 1e-4 --gae-lambda 0.9 1 --hide-site --run-dir ")
+    assert runs[1].settings["gae_lambda"] == "0.8"
+    name = "boreal-generalist-v0-hide_site=True-learning_rate=0.0001-gae_lambda=0.9,1"
+    assert runs[0].folder == tmp_path / "ppo_group" / name / "seed1"
+    assert runs[0].command.steps == 300_000
+
+
+def test_finished_runs_are_skipped_and_a_table_made(tmp_path, capsys, monkeypatch):
+    runs = sweep.all_runs(args(tmp_path))
+    finish(runs[:-1])
+    started = []
+    monkeypatch.setattr(
+        commands, "run_all", lambda words, *rest, **more: started.extend(words) or finish(runs[-1:]) or []
+    )
+    monkeypatch.setattr(sweep.protocol, "compile_physics", lambda lanes: None)
+    sweep.main(args(tmp_path))
+    assert started == [runs[-1].command]
+    table = pd.read_csv(tmp_path / "sweep.csv")
+    assert list(table) == ["learning_rate", "seed", "scalarized_return", "carbon_return", "thaw_return"]
+    assert table.carbon_return.round(6).tolist() == [0.1, 1.1, 0.2, 1.2]
+    best, worst = capsys.readouterr().out.splitlines()[-3:-1]
+    assert best.split()[:3] == ["3e-4", "2", "1.15"] and worst.split()[:3] == ["1e-4", "2", "0.15"]
+
+
+def test_parts_are_all_runs_once(tmp_path, capsys):
+    runs = sweep.all_runs(args(tmp_path))
+    parts = [sweep.part_of(runs, f"{k}/3") for k in (1, 2, 3)]
+    assert sorted((run for part in parts for run in part), key=runs.index) == runs
+    finish(parts[0])
+    sweep.main(args(tmp_path, part="1/3"))
+    assert "2 runs of other parts are not finished" in capsys.readouterr().out
+    assert not (tmp_path / "sweep.csv").exists()
+
+
+def test_a_slurm_array_is_its_parts(tmp_path):
+    """With `python` a script that prints what it is asked to do."""
+    fake = tmp_path / "python"
+    fake.write_text('#!/bin/sh\necho "$@"\n')
+    fake.chmod(0o755)
+    array = {"SLURM_ARRAY_TASK_ID": "4", "SLURM_ARRAY_TASK_MIN": "2", "SLURM_ARRAY_TASK_COUNT": "10"}
+    environment = {**os.environ, **array, "SLURM_SUBMIT_DIR": str(tmp_path), "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    words = [shutil.which("bash"), ROOT / "analysis" / "slurm_array.sh", "a script.py", "--seeds", "1-10"]
+    answer = subprocess.run(words, env=environment, capture_output=True, text=True, check=True).stdout
+    assert answer == "analysis/sweep.py a script.py --seeds 1-10 --address none --part 3/10\n"
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"seeds": "1-"}, "--seeds 1-: numbers and ranges are allowed"),
+        ({"seeds": "1,1-2"}, "each once"),
+        ({"grid": ["learning=1"]}, "unknown flag 'learning'; allowed: env_id"),
+        ({"grid": ["seed=1,2"]}, "unknown flag 'seed'"),
+        ({"grid": ["learning_rate"]}, "flag=value"),
+        ({"grid": ["learning_rate=fast"]}, "fast"),
+        ({"grid": ["learning_rate=2"]}, r"--learning-rate must lie in \[0, 1\]"),
+        ({"grid": ["learning_rate=1e-4,0.0001"]}, "two of its combinations are the same run"),
+        ({"part": "4/3"}, "--part 4/3"),
+    ],
+)
+def test_bad_arguments(changes, message, tmp_path):
+    with pytest.raises(SystemExit, match=message):
+        sweep.main(args(tmp_path, **changes))
+
+
+def test_one_command_trains_all(tmp_path, monkeypatch):
+    """The whole thing, of the toy."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests")]))
+    words = [
+        "ppo_gated.py",
+        "--seeds",
+        "1-2",
+        "--address",
+        "none",
+        "--runs-dir",
+        tmp_path,
+        "--output",
+        tmp_path / "t.csv",
+    ]
+    words[0] = str(SCRIPT.with_name("ppo_gated.py"))
+    words += ["--grid", "env_id=toy_env:toy-v0", "total_timesteps=200", "num_envs=2", "rollout_steps=100"]
+    words += ["eval_episodes=1", "eval_weights=0 1"]
+    command = [sys.executable, ROOT / "analysis" / "sweep.py", *words]
+    out = subprocess.run(list(map(str, command)), capture_output=True, text=True, cwd=tmp_path, check=True).stdout
+    assert "1 runs, 0 of them finished; the others by processes of this machine" in out
+    assert pd.read_csv(tmp_path / "t.csv").seed.tolist() == [1]
+    assert len(list(Path(tmp_path).glob("logs/*.log"))) == 1
