@@ -1,6 +1,8 @@
-"""Draws the paper's figures from the runs that exist: results/figures/*.png and *.pdf.
+"""Draws the paper's figures from the runs that exist, yours and those of the project: runs/figures/*.png and *.pdf.
 
-    python analysis/make_figures.py [--runs-dir runs results/runs] [--figures-dir results/figures]
+    python analysis/make_figures.py [--runs-dir runs results/runs] [--figures-dir runs/figures]
+
+Those of results/figures are of the project's runs alone; `reproduce.py` makes them.
 
 A panel without runs says which command makes them.
 """
@@ -55,7 +57,7 @@ class Args:
     runs_dir: tuple[Path, ...] | None = None
     """folders that hold the runs, at any depth (None: results/runs and runs)"""
     figures_dir: Path | None = None
-    """folder for the figures (None: results/figures, or results/quick/figures)"""
+    """folder for the figures (None: runs/figures, or runs/quick/figures)"""
     quick: bool = False
     """from the runs of `reproduce.py --quick`"""
 
@@ -80,7 +82,7 @@ def main(args: Args) -> None:
         )
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)
-    folder = args.figures_dir or paths.results(args.quick) / "figures"
+    folder = args.figures_dir or paths.runs(args.quick) / "figures"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for module in FIGURES:

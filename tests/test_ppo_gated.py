@@ -1,3 +1,4 @@
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -124,7 +125,7 @@ def test_learns_the_toy(tmp_path):
 
 
 def test_tracking_without_the_package_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "wandb", None)
     with pytest.raises(SystemExit, match="--track wandb: the package is not installed"):
         run_script("cleanrl_style/ppo_gated.py", "--track", "wandb", "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+import torch
 from scripts import ROOT, run_script
 
 TOY = ("--env-id", "resumable_toy:resumable-toy-v0", "--total-timesteps", 1500, "--num-envs", 3, "--eval-episodes", 2)
@@ -186,6 +187,24 @@ def test_a_damaged_checkpoint_is_refused(interrupted, tmp_path, harm):
     with pytest.raises(SystemExit, match="^error: .*checkpoint.pt is damaged.*--overwrite starts over"):
         resume(folder)
     assert before == {path: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("state", [[1], {"weights": 1}, {"script": "ppo_mine"}])
+def test_a_checkpoint_of_another_program_is_refused(interrupted, tmp_path, state):
+    folder = copy(interrupted, tmp_path)
+    torch.save(state, folder / "checkpoint.pt")
+    with pytest.raises(SystemExit, match="checkpoint.pt is no checkpoint of this version of ppo_gated; --overwrite"):
+        resume(folder)
+
+
+@pytest.mark.parametrize("part", ["agent", "optimizer"])
+def test_a_checkpoint_of_another_network_is_refused(interrupted, tmp_path, part):
+    folder = copy(interrupted, tmp_path)
+    state = torch.load(folder / "checkpoint.pt", weights_only=False)
+    state[part].popitem()
+    torch.save(state, folder / "checkpoint.pt")
+    with pytest.raises(SystemExit, match=f"checkpoint.pt: its {part} does not fit that of this ppo_gated; --overwrite"):
+        resume(folder)
 
 
 def test_a_table_shorter_than_its_checkpoint_is_refused(interrupted, tmp_path):
