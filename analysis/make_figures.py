@@ -75,11 +75,8 @@ def main(args: Args) -> None:
     """Draw every figure; name what was left out."""
     results = Results.load(args.quick, args.runs_dir)
     if not any(results.rows.values()):
-        where = ", ".join(map(str, results.roots))
-        sys.exit(
-            f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, the first is\n"
-            f"  {results.jobs[0].command}"
-        )
+        where, first = ", ".join(map(str, results.roots)), results.jobs[0].command
+        protocol.fail(f"no finished run under {where}; `{first}` makes the first, `python analysis/reproduce.py` all")
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)
     folder = args.figures_dir or paths.runs(args.quick) / "figures"

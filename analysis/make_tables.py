@@ -94,12 +94,8 @@ def main(args: Args) -> None:
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)
     if not results.runs:
-        where = ", ".join(map(str, results.roots))
-        commands = dict.fromkeys(job.command for job in results.missing if job.exists)
-        sys.exit(
-            f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, these the rows:\n"
-            + "\n".join(f"  {command}" for command in commands)
-        )
+        where, first = ", ".join(map(str, results.roots)), next(job.command for job in results.missing if job.exists)
+        protocol.fail(f"no finished run under {where}; `{first}` makes the first, `python analysis/reproduce.py` all")
     folder = args.tables_dir or paths.runs(args.quick) / "tables"
     try:
         folder.mkdir(parents=True, exist_ok=True)
