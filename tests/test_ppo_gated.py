@@ -93,6 +93,7 @@ def test_losses_and_their_gradient_are_those_of_an_independent_implementation(no
         assert (sums[0] - sums[1]) / (2 * h) == pytest.approx(parameter.grad.view(-1)[k].item(), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_learns_the_toy(tmp_path):
     run_script(
         "cleanrl_style/ppo_gated.py",

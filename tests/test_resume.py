@@ -93,10 +93,10 @@ def assert_same_bytes(folder, other):
 @pytest.mark.parametrize(
     "script, common, moments",
     [
-        ("ppo_curriculum", TOY, "any"),
-        ("ppo_curriculum", BOREAL_ASYNC, "checkpoint"),
-        ("ppo_gated", BOREAL, "checkpoint"),
-        ("eupg_var_lambda", BOREAL, "any"),
+        pytest.param("ppo_curriculum", TOY, "any", marks=pytest.mark.slow),
+        pytest.param("ppo_curriculum", BOREAL_ASYNC, "checkpoint", marks=pytest.mark.slow),
+        pytest.param("ppo_gated", BOREAL, "checkpoint", marks=pytest.mark.slow),
+        pytest.param("eupg_var_lambda", BOREAL, "any", marks=pytest.mark.slow),
         ("eupg_fixed_lambda", TOY, "any checkpoint"),
     ],
     ids=[
@@ -151,6 +151,7 @@ def test_ctrl_c_says_how_to_go_on(interrupted):
     assert (folder / "checkpoint.pt").exists() and not (folder / "evaluation.csv").exists()
 
 
+@pytest.mark.slow
 def test_sigterm_is_as_ctrl_c(tmp_path):
     process = start("eupg_var_lambda", tmp_path / "run", *arguments("eupg_var_lambda", TOY), TOY_SECONDS="0.01")
     wait_for_rows(process, tmp_path / "run", 1)
@@ -265,6 +266,7 @@ def test_an_environment_that_cannot_be_made_in_a_worker_ends_the_run(tmp_path):
     assert err.strip().splitlines()[-1] == "error: an environment could not be made: its error is above"
 
 
+@pytest.mark.slow
 def test_a_killed_worker_ends_the_run(interrupted, tmp_path):
     folder = copy(interrupted, tmp_path)
     process = start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_SECONDS="0.01")
