@@ -134,7 +134,8 @@ def learn(script, folder, *arguments):
     return evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean() + 6
 
 
-@pytest.mark.parametrize("utility", [pytest.param("total", marks=pytest.mark.slow), "future"])
+@pytest.mark.slow
+@pytest.mark.parametrize("utility", ["total", "future"])
 def test_fixed_lambda_learns_the_toy(tmp_path, utility):
     returns = learn(
         "eupg_fixed_lambda",
