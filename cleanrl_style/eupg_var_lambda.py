@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from cleanrl_style.command_line import parse
+from cleanrl_style.flags import parse
 
 
 @dataclass

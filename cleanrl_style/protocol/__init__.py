@@ -1,12 +1,12 @@
 """What every training script and heuristic shares, whatever its algorithm.
 
-A script reads its arguments (`parse`, of `cleanrl_style.command_line`, which loads at once), asks the environment what
+A script reads its arguments (`parse`, of `cleanrl_style.flags`, which loads at once), asks the environment what
 it is (`make_task`), opens its folder (`Run`), trains on `run.make_envs()`, logs rows, saves checkpoints and shows
 `Progress` meanwhile, and ends with `run.save_policy`, `evaluate` and `run.finish`. `load_agent` gives the policy of a
 finished run.
 """
 
-from cleanrl_style.command_line import FIRST_EVALUATION_SEED, LIMITS, MAX_ENVS, fail, parse
+from cleanrl_style.flags import FIRST_EVALUATION_SEED, LIMITS, MAX_ENVS, fail, parse
 from cleanrl_style.protocol.agents import load_agent
 from cleanrl_style.protocol.arguments import make_task, not_default
 from cleanrl_style.protocol.compilation import compile_physics

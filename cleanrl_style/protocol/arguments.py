@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 import boreal_env
-from cleanrl_style.command_line import check_limits, fail
+from cleanrl_style.flags import check_limits, fail
 from cleanrl_style.protocol.fronts import evaluation_weights
 from cleanrl_style.protocol.sites import evaluation_seeds
 from cleanrl_style.protocol.task import Task

@@ -21,7 +21,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from cleanrl_style.command_line import fail
+from cleanrl_style.flags import fail
 from cleanrl_style.protocol import tracking, training_envs
 from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, not_default
 from cleanrl_style.protocol.evaluation import PRIMARY, lanes_of_evaluation

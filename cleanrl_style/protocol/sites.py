@@ -4,7 +4,7 @@ import csv
 import functools
 from importlib.resources import files
 
-from cleanrl_style.command_line import FIRST_EVALUATION_SEED
+from cleanrl_style.flags import FIRST_EVALUATION_SEED
 from cleanrl_style.protocol.task import Task
 
 SPLITS = ("test", "validation")  # results are of the first; variants and budgets are chosen on the second

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from scripts import ROOT, run_script
 
-from cleanrl_style import command_line
+from cleanrl_style import flags
 
 SCRIPTS = sorted(path.stem for path in (ROOT / "cleanrl_style").glob("*.py") if "\nclass Agent" in path.read_text())
 
@@ -45,7 +45,7 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
 
 
 @pytest.mark.parametrize(
-    "flags, message",
+    "given, message",
     [
         (["--seed", "-1"], r"--seed must lie in \[0, 999999\], not -1"),
         (["--eval-weights", "0", "2"], r"--eval-weights must lie in \[0, 1\], not 2.0"),
@@ -55,14 +55,14 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
         (["--seed"], ".*--seed.*"),
     ],
 )
-def test_a_bad_value_is_named(flags, message):
+def test_a_bad_value_is_named(given, message):
     with pytest.raises(SystemExit, match=f"^error: {message}$"):
-        run_script("cleanrl_style/ppo_gated.py", *flags)
+        run_script("cleanrl_style/ppo_gated.py", *given)
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
 def test_any_encoding_will_do(encoding):
-    script = "from cleanrl_style.command_line import prepare_output; prepare_output(); print('kgC m⁻²')"
+    script = "from cleanrl_style.flags import prepare_output; prepare_output(); print('kgC m⁻²')"
     process = python("-c", script, stdout=subprocess.PIPE, env={"PYTHONIOENCODING": encoding}, encoding=encoding)
     assert process.communicate() == ("kgC m??\n" if encoding == "ascii" else "kgC m?²\n", "")
     path = ROOT / "cleanrl_style" / "ppo_gated.py"
@@ -70,7 +70,7 @@ def test_any_encoding_will_do(encoding):
     assert err.startswith("error: Unrecognized options: --sed") and err.count("\n") == 1
 
 
-LINES = "from cleanrl_style.command_line import prepare_output; prepare_output()\nfor i in range({}): print(i)"
+LINES = "from cleanrl_style.flags import prepare_output; prepare_output()\nfor i in range({}): print(i)"
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_a_full_disk_is_a_line():
 
 
 def test_ctrl_c_is_a_line(capsys):
-    command_line.end_quietly(KeyboardInterrupt, KeyboardInterrupt(), None)
+    flags.end_quietly(KeyboardInterrupt, KeyboardInterrupt(), None)
     assert capsys.readouterr().err == "\ninterrupted\n"
 
 
@@ -103,4 +103,4 @@ def test_a_script_without_a_terminal_works(monkeypatch):
 
     monkeypatch.setattr(sys, "stdout", None)
     monkeypatch.setattr(sys, "argv", ["script.py", "--seed", "2"])
-    assert command_line.parse(Args).seed == 2
+    assert flags.parse(Args).seed == 2
