@@ -5,7 +5,9 @@ manual, and that of many in lockstep. What they are made of is in `sim/task/`: w
 valid, what is rewarded, the preference, and the episodes that both share. `python -m boreal_env` says what there is.
 """
 
+import importlib.util
 import runpy
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -16,6 +18,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 import sim
+
+if not Path(__file__).with_name("sim").samefile(_found := getattr(sim, "__path__", [sim.__file__])[0]):
+    raise ImportError(f"boreal_env needs the package `sim` beside it, but Python found {_found} first: rename that")
+
 from sim.block import kernel, lanes_for
 from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS
@@ -258,6 +264,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
         EzPickle.__init__(self, render_mode=render_mode, **kwargs)
         if render_mode is not None:
             check_name("render_mode", render_mode, self.metadata["render_modes"])
+            if importlib.util.find_spec("matplotlib") is None:
+                raise gym.error.DependencyNotInstalled('render_mode "rgb_array": pip install matplotlib')
         self.render_mode = render_mode
         self._describe(1, kwargs)
         self.observation_space = self._episodes.observation_space

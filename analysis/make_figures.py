@@ -1,6 +1,8 @@
-"""Draws the paper's figures from the runs that exist: results/figures/*.png and *.pdf.
+"""Draws the paper's figures from the runs that exist, yours and those of the project: runs/figures/*.png and *.pdf.
 
-    python analysis/make_figures.py [--runs-dir runs results/runs] [--figures-dir results/figures]
+    python analysis/make_figures.py [--runs-dir runs results/runs] [--figures-dir runs/figures]
+
+Those of results/figures are of the project's runs alone; `reproduce.py` makes them.
 
 A panel without runs says which command makes them.
 """
@@ -55,7 +57,7 @@ class Args:
     runs_dir: tuple[Path, ...] | None = None
     """folders that hold the runs, at any depth (None: results/runs and runs)"""
     figures_dir: Path | None = None
-    """folder for the figures (None: results/figures, or results/quick/figures)"""
+    """folder for the figures (None: runs/figures, or runs/quick/figures)"""
     quick: bool = False
     """from the runs of `reproduce.py --quick`"""
 
@@ -73,14 +75,11 @@ def main(args: Args) -> None:
     """Draw every figure; name what was left out."""
     results = Results.load(args.quick, args.runs_dir)
     if not any(results.rows.values()):
-        where = ", ".join(map(str, results.roots))
-        sys.exit(
-            f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, the first is\n"
-            f"  {results.jobs[0].command}"
-        )
+        where, first = ", ".join(map(str, results.roots)), results.jobs[0].command
+        protocol.fail(f"no finished run under {where}; `{first}` makes the first, `python analysis/reproduce.py` all")
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)
-    folder = args.figures_dir or paths.results(args.quick) / "figures"
+    folder = args.figures_dir or paths.runs(args.quick) / "figures"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for module in FIGURES:

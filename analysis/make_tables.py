@@ -1,6 +1,8 @@
-"""Turns the runs that exist into results/tables/*.csv, *.md and *.tex, ours beside the paper's.
+"""Turns the runs that exist, yours and the project's, into runs/tables/*.csv, *.md and *.tex, beside the paper's.
 
-    python analysis/make_tables.py [--runs-dir runs results/runs] [--tables-dir results/tables]
+    python analysis/make_tables.py [--runs-dir runs results/runs] [--tables-dir runs/tables]
+
+Those of results/tables are of the project's runs alone; `reproduce.py` makes them.
 
 Runs are recognised by their config.json, never by the name of their folder. Runs of one script that differ only in
 the seed form one row: the metrics are computed for each run, then aggregated over training seeds (interquartile mean,
@@ -61,7 +63,7 @@ class Args:
     runs_dir: tuple[Path, ...] | None = None
     """folders that hold the runs, at any depth (None: results/runs and runs)"""
     tables_dir: Path | None = None
-    """folder for the tables (None: results/tables, or results/quick/tables)"""
+    """folder for the tables (None: runs/tables, or runs/quick/tables)"""
     quick: bool = False
     """from the runs of `reproduce.py --quick`"""
 
@@ -92,13 +94,9 @@ def main(args: Args) -> None:
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)
     if not results.runs:
-        where = ", ".join(map(str, results.roots))
-        commands = dict.fromkeys(job.command for job in results.missing if job.exists)
-        sys.exit(
-            f"error: no finished run under {where}; `python analysis/reproduce.py` makes all, these the rows:\n"
-            + "\n".join(f"  {command}" for command in commands)
-        )
-    folder = args.tables_dir or paths.results(args.quick) / "tables"
+        where, first = ", ".join(map(str, results.roots)), next(job.command for job in results.missing if job.exists)
+        protocol.fail(f"no finished run under {where}; `{first}` makes the first, `python analysis/reproduce.py` all")
+    folder = args.tables_dir or paths.runs(args.quick) / "tables"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for module in TABLES:

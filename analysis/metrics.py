@@ -8,7 +8,7 @@ first's), `seed` (of the episode: the same seed is the same site and weather und
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+import scipy  # loads scipy.stats when it is first used
 
 from cleanrl_style.protocol.fronts import (  # noqa: F401
     REFERENCE_POINT,
@@ -55,7 +55,7 @@ def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     n = len(values)
     if n < 2:
         return values.mean(axis=0), np.full(values.shape[1:], np.nan)
-    return values.mean(axis=0), stats.t.ppf(0.975, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
+    return values.mean(axis=0), scipy.stats.t.ppf(0.975, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
 
 
 def with_interval(name: str, values: np.ndarray) -> dict[str, float]:
@@ -146,7 +146,7 @@ def preference_response(evaluation: pd.DataFrame) -> pd.DataFrame:
 
 def iqm(values: np.ndarray) -> float:
     """Interquartile mean: the mean of the middle half (Agarwal et al. 2021)."""
-    return float(stats.trim_mean(np.asarray(values, dtype=float), 0.25))
+    return float(scipy.stats.trim_mean(np.asarray(values, dtype=float), 0.25))
 
 
 def bootstrap_interval(values: np.ndarray, repetitions: int = 50_000) -> tuple[float, float]:
@@ -158,7 +158,7 @@ def bootstrap_interval(values: np.ndarray, repetitions: int = 50_000) -> tuple[f
     if len(values) < 2:
         return np.nan, np.nan
     resampled = np.random.default_rng(0).choice(values, (repetitions, len(values)))
-    low, high = np.percentile(stats.trim_mean(resampled, 0.25, axis=1), [2.5, 97.5])
+    low, high = np.percentile(scipy.stats.trim_mean(resampled, 0.25, axis=1), [2.5, 97.5])
     return float(low), float(high)
 
 
@@ -168,11 +168,11 @@ def bootstrap_band(curves: np.ndarray, repetitions: int = 2000) -> tuple[np.ndar
     Whole curves are resampled; the interval is NaN for fewer than two seeds. Deterministic.
     """
     curves = np.asarray(curves, dtype=float)
-    middle = stats.trim_mean(curves, 0.25, axis=0)
+    middle = scipy.stats.trim_mean(curves, 0.25, axis=0)
     if len(curves) < 2:
         return middle, np.full_like(middle, np.nan), np.full_like(middle, np.nan)
     chosen = np.random.default_rng(0).integers(len(curves), size=(repetitions, len(curves)))
-    low, high = np.percentile(stats.trim_mean(curves[chosen], 0.25, axis=1), [2.5, 97.5], axis=0)
+    low, high = np.percentile(scipy.stats.trim_mean(curves[chosen], 0.25, axis=1), [2.5, 97.5], axis=0)
     return middle, low, high
 
 
@@ -219,7 +219,7 @@ def score_interval(gained: np.ndarray, plans: np.ndarray | None, repetitions: in
     generator = np.random.default_rng(0)
     scores = of(generator.multinomial(sites, np.full(sites, 1 / sites), repetitions) / sites)
     drawn = generator.integers(seeds, size=(repetitions, seeds))
-    values = stats.trim_mean(np.take_along_axis(scores, drawn, axis=1), 0.25, axis=1)
+    values = scipy.stats.trim_mean(np.take_along_axis(scores, drawn, axis=1), 0.25, axis=1)
     low, high = np.nanpercentile(values, [2.5, 97.5])
     return middle, float(low), float(high)
 
@@ -237,6 +237,6 @@ def seeds_to_tell(values: np.ndarray, difference: float = 0.1, power: float = 0.
         if deviation == 0:
             return seeds
         freedom, shift = 2 * seeds - 2, difference / deviation * np.sqrt(seeds / 2)
-        if stats.nct.sf(stats.t.ppf(0.975, freedom), freedom, shift) >= power:
+        if scipy.stats.nct.sf(scipy.stats.t.ppf(0.975, freedom), freedom, shift) >= power:
             return seeds
     return np.inf

@@ -92,8 +92,9 @@ def main(args: Args) -> None:
     except KeyboardInterrupt:
         sys.exit("\nstopped; the same command goes on from here")
     archive.archive(runs_dir, archive_dir)
-    make_tables.main(make_tables.Args(quick=args.quick))
-    make_figures.main(make_figures.Args(quick=args.quick))
+    results = paths.results(args.quick)
+    make_tables.main(make_tables.Args(quick=args.quick, tables_dir=results / "tables"))
+    make_figures.main(make_figures.Args(quick=args.quick, figures_dir=results / "figures"))
     claims.main(claims.Args(quick=args.quick))
     if not args.quick:
         document_results.main(document_results.Args())

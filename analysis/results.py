@@ -90,8 +90,12 @@ class Results:
     def load(quick: bool, roots: tuple[Path, ...] | None = None) -> "Results":
         """The results of `reproduce.py`, or of `reproduce.py --quick`.
 
-        The archive comes before the runs themselves, so that a clone's tables have the same digits.
+        The archive comes before the runs themselves, so that a clone's tables have the same digits. Exits with one line
+        if a folder of `roots` is not there.
         """
+        for root in roots or ():
+            if not root.is_dir():
+                protocol.fail(f"--runs-dir {root}: no such folder")
         jobs = experiments.quick_jobs() if quick else experiments.jobs()
         return Results(roots or (paths.archive(quick), paths.runs(quick)), jobs, paths.studies(quick))
 

@@ -5,11 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-import pandas as pd
-
-from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts
+from cleanrl_style.flags import parse
 
 
 @dataclass
@@ -43,7 +39,12 @@ def main(script: str, policy) -> None:
     are the same under every weight, and are simulated once. None has another policy when greedy: random actions
     stay random.
     """
-    args = protocol.parse(Args)
+    args = parse(Args)  # a bad flag is answered before all that follows is loaded
+
+    import numpy as np
+
+    from cleanrl_style import protocol
+
     task = protocol.make_task(args)
     if not task.boreal:
         protocol.fail(f"--env-id {args.env_id}: fixed strategies know the boreal environments alone")
@@ -61,8 +62,13 @@ def main(script: str, policy) -> None:
         run.finish(*(repeat(task, table, args.eval_weights) for table in (episodes, years)))
 
 
-def repeat(task: protocol.Task, table: pd.DataFrame, weights) -> pd.DataFrame:
-    """The table once for every policy and weight, scalarised anew."""
+def repeat(task, table, weights):
+    """The table of episodes, or of their years, once for every policy and weight, scalarised anew."""
+    import pandas as pd
+
+    from cleanrl_style import protocol
+    from cleanrl_style.protocol import fronts
+
     copies = []
     for policy in protocol.POLICIES:
         for its_weights in map(task.check_weights, weights):

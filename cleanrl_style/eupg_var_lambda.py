@@ -8,13 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-import torch
-import torch.nn as nn
-import torch.optim as optim
-from torch.distributions.categorical import Categorical
-
-from cleanrl_style import protocol
+from cleanrl_style.flags import parse
 
 
 @dataclass
@@ -69,6 +63,18 @@ class Args:
     """follow the run's tables in TensorBoard (files in the run's folder) or Weights & Biases"""
     wandb_project_name: str = "borearl"
     """project of Weights & Biases"""
+
+
+if __name__ == "__main__":
+    args = parse(Args)  # a bad flag is answered before all that follows is loaded
+
+import numpy as np
+import torch
+import torch.nn as nn
+import torch.optim as optim
+from torch.distributions.categorical import Categorical
+
+from cleanrl_style import protocol
 
 
 def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
@@ -148,7 +154,6 @@ def eupg_loss(agent, x, mask, action, utility):
 
 
 if __name__ == "__main__":
-    args = protocol.parse(Args)
     if args.scalarization == "chebyshev" and args.utility == "future":
         protocol.fail("--utility future is for --scalarization linear: Chebyshev's is the utility of a whole return")
     task = protocol.make_task(args, hide_site=args.hide_site)
@@ -189,9 +194,7 @@ if __name__ == "__main__":
         next_obs, _ = envs.reset(seed=[start_seed + i for i in range(args.num_envs)])
 
         # RESUME: all is as when the checkpoint was written
-        if state := run.resume():
-            agent.load_state_dict(state["agent"])
-            optimizer.load_state_dict(state["optimizer"])
+        if state := run.resume(agent=agent, optimizer=optimizer):
             iteration, global_step, episode = state["iteration"], state["global_step"], state["episode"]
             next_obs, batch_steps = state["next_obs"], state["batch_steps"]
 

@@ -7,12 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-import torch
-import torch.nn as nn
-import torch.optim as optim
-
-from cleanrl_style import protocol
+from cleanrl_style.flags import parse
 
 
 @dataclass
@@ -85,6 +80,17 @@ class Args:
     """follow the run's tables in TensorBoard (files in the run's folder) or Weights & Biases"""
     wandb_project_name: str = "borearl"
     """project of Weights & Biases"""
+
+
+if __name__ == "__main__":
+    args = parse(Args)  # a bad flag is answered before all that follows is loaded
+
+import numpy as np
+import torch
+import torch.nn as nn
+import torch.optim as optim
+
+from cleanrl_style import protocol
 
 
 def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
@@ -199,7 +205,6 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value
 
 
 if __name__ == "__main__":
-    args = protocol.parse(Args)
     if args.scalarization == "chebyshev" and args.per_objective_advantages:
         protocol.fail("--per-objective-advantages is for --scalarization linear: it weighs each advantage by itself")
     task = protocol.make_task(args, hide_site=args.hide_site)
@@ -239,9 +244,7 @@ if __name__ == "__main__":
         episode_returns = np.zeros((args.num_envs, task.num_objectives))
 
         # RESUME: all is as when the checkpoint was written
-        if state := run.resume():
-            agent.load_state_dict(state["agent"])
-            optimizer.load_state_dict(state["optimizer"])
+        if state := run.resume(agent=agent, optimizer=optimizer):
             first_iteration, global_step, episode = state["iteration"] + 1, state["global_step"], state["episode"]
             next_obs, next_done, episode_returns = state["next_obs"], state["next_done"], state["episode_returns"]
 

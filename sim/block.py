@@ -4,13 +4,14 @@ Stands are rows of arrays, (stands, fields); a block has them as lanes of `sim.s
 """
 
 import functools
+import logging
 import math
 import threading
 from types import SimpleNamespace
 
 import numpy as np
 
-from sim.jit import cache_folder, loops_kept, specialised, uncompiled
+from sim.jit import alone, cache_folder, is_cacheable, loops_kept, specialised, uncompiled, warn_uncached
 from sim.management import decode
 from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype, daily_dtype
 from sim.year import simulate_year
@@ -109,21 +110,39 @@ def namespace(record):
 
 
 def kernel(lanes: int):
-    """The year kernel for blocks of this many lanes, compiled or loaded from the disk cache when it is first wanted."""
+    """The year kernel for blocks of this many lanes, compiled or loaded from the disk cache when it is first wanted.
+
+    Of several processes that want it one compiles it, and says so through the logger `sim.block`; the others wait.
+    """
     with _MAKING:
         if lanes not in _MADE:
-            made = specialised(simulate_year, f"{lanes}_lanes")
-            with loops_kept():
-                made(np.zeros(1, block_dtype(lanes)), 1, 0, np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes)))
-            _MADE[lanes] = made
+            with alone(f"{lanes}_lanes"):
+                if not is_compiled(lanes):
+                    _LOGGER.warning("compiling the physics, once for this processor: half a minute")
+                _MADE[lanes] = _made(lanes)
         return _MADE[lanes]
+
+
+def _made(lanes: int):
+    """Compiled or loaded."""
+    made = specialised(simulate_year, f"{lanes}_lanes")
+    nothing = np.zeros(1, block_dtype(lanes)), 1, 0, np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes))
+    with loops_kept():
+        try:
+            made(*nothing)
+        except OSError as error:  # a full disk: it is compiled, but not kept
+            warn_uncached(error)
+            made(*nothing)
+    return made
 
 
 def is_compiled(lanes: int) -> bool:
     """Whether a kernel is ready in this process or on disk."""
-    return lanes in _MADE or any(cache_folder().rglob(f"*.simulate_year_{lanes}_lanes-*.nbi"))
+    on_disk = cache_folder().rglob(f"*.simulate_year_{lanes}_lanes-*.nbi")
+    return lanes in _MADE or (any(on_disk) and is_cacheable())
 
 
+_LOGGER = logging.getLogger("sim.block")
 _MADE: dict = {}  # kernels by lanes
 _MAKING = threading.Lock()  # threads may come together, and numba's cache folder is one setting for all of them
 

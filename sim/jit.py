@@ -16,13 +16,20 @@ import functools
 import hashlib
 import os
 import sys
+import tempfile
 import types
+import warnings
 from pathlib import Path
 
 import llvmlite.binding as llvm
 import numba
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
+
+try:
+    import fcntl
+except ImportError:  # Windows, where two processes compile the same
+    fcntl = None  # type: ignore[assignment]
 
 OPTIONS = {"error_model": "numpy", "nogil": True}
 
@@ -37,17 +44,58 @@ def cache_folder() -> Path:
     digest = hashlib.sha256(repr((numba.__version__, sys.version, cpu)).encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
-    user_cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    try:
+        user_cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    except RuntimeError:  # a user without a home
+        user_cache = os.devnull
     base = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(user_cache) / "borearl")
     return base / digest.hexdigest()[:16]
 
 
+@functools.cache
+def is_cacheable() -> bool:
+    """Whether the cache folder takes compiled kernels; warns if not."""
+    try:
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=cache_folder()).close()
+    except OSError as error:
+        warn_uncached(error)
+        return False
+    return True
+
+
+def warn_uncached(error: OSError) -> None:
+    """Say that the next process compiles again."""
+    warnings.warn(
+        f"{cache_folder()} cannot be written ({error.strerror}): every process compiles the physics anew, for half a "
+        "minute. NUMBA_CACHE_DIR names another folder.",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
+@contextlib.contextmanager
+def alone(name: str):
+    """While it lasts, other processes that come here under the same name wait."""
+    if fcntl is None or not is_cacheable():
+        yield
+        return
+    with (cache_folder() / f"{name}.lock").open("w") as lock:
+        with contextlib.suppress(OSError):  # a file system without locks: two processes compile the same
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                fcntl.flock(lock, fcntl.LOCK_UN)  # closing would not do where a child was forked meanwhile
+
+
 def specialised(dispatcher: Dispatcher, name: str):
-    """A copy of a compiled function and of all that it calls, under names that end in `name`, cached on disk."""
+    """A copy of a compiled function and of all that it calls, under names that end in `name`, cached if possible."""
     previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(cache_folder())
     try:
         copy = _copy(dispatcher, {}, lambda function, original: _recompiled(function, original, name))
-        return numba.njit(**OPTIONS, cache=True)(copy.py_func)
+        return numba.njit(**OPTIONS, cache=is_cacheable())(copy.py_func)
     finally:
         numba.config.CACHE_DIR = previous
 

@@ -42,6 +42,7 @@ def test_a_run_and_its_archive_are_the_same(archived):
         pd.testing.assert_frame_equal(copy.tables[name], table)
 
 
+@pytest.mark.slow
 def test_tables_from_the_archive_are_the_same_bytes(archived, tmp_path):
     for name, folder in (("of_runs", TINY_RUNS), ("of_archive", archived)):
         make_tables.main(make_tables.Args(runs_dir=(folder,), tables_dir=tmp_path / name))

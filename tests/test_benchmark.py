@@ -25,6 +25,7 @@ FIGURES = {
 }
 
 
+@pytest.mark.slow
 def test_every_section_has_positive_figures_in_its_units(monkeypatch):
     monkeypatch.setattr(benchmark, "ROLLOUT", 256)
     table = benchmark.run(benchmark.Args(quick=True, repeats=1))

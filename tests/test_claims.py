@@ -439,6 +439,7 @@ def test_the_jobs_fill_every_claim(tmp_path):
     assert not [row for one in findings.values() for row in one.rows if row.ours == "no runs yet"]
 
 
+@pytest.mark.slow
 def test_quick_jobs_raise_nothing(tmp_path):
     jobs = experiments.quick_jobs()
     studies = write_everything(tmp_path, jobs)
@@ -463,6 +464,7 @@ def test_the_document(tmp_path, capsys):
     assert f"| `main` | 2 | {len(jobs)} | `constant_plans`" in text
 
 
+@pytest.mark.slow
 def test_the_committed_document_shows_the_committed_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     claims.main(claims.Args(output=tmp_path / "reproduction.md"))

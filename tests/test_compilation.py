@@ -1,12 +1,17 @@
 """The first start says what it does; later ones have nothing to say."""
 
+import errno
 import re
+import threading
 import time
 
+import numba
 import pytest
 
 from cleanrl_style import protocol
 from cleanrl_style.protocol import compilation
+from sim import block, jit
+from sim.jit import phase
 
 
 @pytest.fixture
@@ -73,3 +78,91 @@ def test_what_is_needed_later_is_compiled_in_the_background(made, begun, capsys)
     protocol.compile_physics((4,))  # now it is needed: no second compilation, the first is waited for
     assert begun == [4] and not compilation._UNDER_WAY and made == [16, 16, 4]
     assert capsys.readouterr().out.startswith("compiling the physics")
+
+
+# ------------------------------------------------------------------------------------------------ what is kept of it
+
+
+@phase
+def simulate_year(block, steps, days, forcing, output):
+    """What is compiled here in place of the physics."""
+    return steps + 1
+
+
+@pytest.fixture
+def cache(monkeypatch, tmp_path):
+    """A function that has the kernels of another physics kept in a folder; of these none is made yet."""
+
+    def keep(folder):
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+        jit.cache_folder.cache_clear()
+        jit.is_cacheable.cache_clear()
+        monkeypatch.setattr(block, "_MADE", {})
+        monkeypatch.setattr(block, "simulate_year", simulate_year)
+        return folder
+
+    yield keep
+    jit.cache_folder.cache_clear()
+    jit.is_cacheable.cache_clear()
+
+
+def test_the_library_says_that_it_compiles_and_keeps_it(cache, tmp_path, caplog):
+    cache(tmp_path)
+    assert not block.is_compiled(1)
+    assert block.kernel(1)(None, 1, 0, None, None) == 2
+    assert [record.message for record in caplog.records] == [
+        "compiling the physics, once for this processor: half a minute"
+    ]
+    cache(tmp_path)
+    assert block.is_compiled(1)
+    assert block.kernel(1).stats.cache_hits and len(caplog.records) == 1
+
+
+def test_where_nothing_can_be_written_it_is_compiled_uncached_with_one_warning(cache, tmp_path):
+    (tmp_path / "file").touch()
+    folder = cache(tmp_path / "file" / "cache")
+    with pytest.warns(RuntimeWarning, match="file/cache.* cannot be written .*NUMBA_CACHE_DIR") as warned:
+        assert block.kernel(1)(None, 1, 0, None, None) == 2
+        block.kernel(4)
+    assert len(warned) == 1 and not folder.exists()
+    assert not list(tmp_path.rglob("*.nbi"))
+
+
+def test_a_full_disk_keeps_nothing_and_says_so(cache, tmp_path, monkeypatch):
+    def save(self, key, data):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    cache(tmp_path)
+    monkeypatch.setattr(numba.core.caching.IndexDataCacheFile, "save", save)
+    with pytest.warns(RuntimeWarning, match="No space left on device"):
+        assert block.kernel(1).signatures
+
+
+def test_a_user_without_a_home_is_one_without_a_cache(cache, monkeypatch):
+    def home():
+        raise RuntimeError("Could not determine home directory.")
+
+    cache("")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(jit.Path, "home", home)
+    with pytest.warns(RuntimeWarning, match="cannot be written"):
+        assert not jit.is_cacheable()
+
+
+def test_one_compiles_while_others_wait(cache, tmp_path):
+    cache(tmp_path)
+    order, came = [], threading.Event()
+
+    def second():
+        came.set()
+        with jit.alone("kernel"):
+            order.append("second")
+
+    with jit.alone("kernel"):
+        other = threading.Thread(target=second)
+        other.start()
+        came.wait()
+        time.sleep(0.2)
+        order.append("first")
+    other.join()
+    assert order == ["first", "second"]

@@ -45,6 +45,7 @@ def compare(number, days, observed):
     print(max(np.nanmax(np.abs(b - a) / np.maximum(np.abs(a), 1e-6)) for a, b in zip(*results, strict=True)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_a_simulated_gpu_gives_what_the_cpu_gives(case):
     """In a process of its own: numba decides at its import whether to simulate."""

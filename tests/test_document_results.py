@@ -27,6 +27,7 @@ def read(folder):
     }
 
 
+@pytest.mark.slow
 def test_the_committed_documents_show_the_committed_runs(pages, monkeypatch):
     monkeypatch.chdir(ROOT)
     document_results.main(document_results.Args(runs_dir=(Path("results/runs"),), root=pages))

@@ -134,6 +134,7 @@ def learn(script, folder, *arguments):
     return evaluation[evaluation.policy == "greedy"].groupby("preference").scalarized_return.mean() + 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("utility", ["total", "future"])
 def test_fixed_lambda_learns_the_toy(tmp_path, utility):
     returns = learn(
@@ -153,6 +154,7 @@ def test_fixed_lambda_learns_the_toy(tmp_path, utility):
     assert (pd.read_csv(tmp_path / "episodes.csv").preference == 1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_variable_lambda_learns_to_follow_the_preference(tmp_path, seed):
     """Without a bonus for entropy the policy settles before it has told the preferences apart."""

@@ -87,6 +87,7 @@ def test_timing_share():
     assert fronts.timing_share(front, np.array([(2, 2), (0, -1)])) == pytest.approx(1 - 6 / 11)
 
 
+@pytest.mark.slow
 def test_a_tiny_front_can_be_repeated_and_is_reported_on_other_weathers():
     site = open_loop.FIRST_SITE_SEED
     table = fronts.study(site, TINY, seed=1, years=6)
@@ -105,6 +106,7 @@ def test_mechanisms_are_switched_off():
     assert (on != off).all()
 
 
+@pytest.mark.slow
 def test_a_finished_front_is_not_searched_again(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(fronts, "QUICK", TINY)
     monkeypatch.setattr(fronts, "YEARS", 6)

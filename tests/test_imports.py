@@ -1,11 +1,15 @@
 """The house: analysis reads what runs leave and nothing needs it; no two files import each other; lazy libraries."""
 
 import ast
+import os
 import subprocess
 import sys
 
 import pytest
+from gymnasium.error import DependencyNotInstalled
 from scripts import ROOT
+
+from boreal_env import BorealEnv
 
 PACKAGES = ("sim", "cleanrl_style", "baselines_heuristic", "analysis")
 FILES = sorted([ROOT / "boreal_env.py", *(path for name in PACKAGES for path in (ROOT / name).rglob("*.py"))])
@@ -62,7 +66,24 @@ def test_the_simulator_knows_neither_task_nor_training():
 
 
 @pytest.mark.parametrize("module", ["boreal_env", "cleanrl_style.protocol", "baselines_heuristic"])
-def test_pictures_and_fronts_are_imported_when_they_are_made(module):
+def test_what_is_slow_or_an_extra_is_imported_when_it_is_needed(module):
     code = f"import sys, {module}; print(*sys.modules)"
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT).stdout
-    assert not {"matplotlib", "moocore", "torch"} & set(names.split())
+    assert not {"matplotlib", "mo_gymnasium", "moocore", "scipy.stats", "torch", "tyro"} & set(names.split())
+
+
+def test_a_picture_without_its_library_is_refused(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(DependencyNotInstalled, match='^render_mode "rgb_array": pip install matplotlib$'):
+        BorealEnv(render_mode="rgb_array")
+
+
+@pytest.mark.parametrize("name", ["sim/__init__.py", "sim.py"])
+def test_another_sim_is_named(tmp_path, name):
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.touch()
+    command, environment = [sys.executable, "-c", "import boreal_env"], {**os.environ, "PYTHONPATH": str(ROOT)}
+    said = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment).stderr.splitlines()
+    assert said[-1].startswith("ImportError: boreal_env needs the package `sim` beside it, but Python found ")
+    assert str(tmp_path / "sim") in said[-1]

@@ -8,7 +8,7 @@ import pytest
 from tiny_runs import TINY_RUNS, write_run, write_run_of_three
 
 import boreal_env
-from analysis import archive, experiments, make_tables, paths, stored
+from analysis import archive, experiments, make_figures, make_tables, paths, stored
 from analysis.results import Results
 from analysis.studies.signal_to_noise import CONTRASTS
 from analysis.tables import (
@@ -484,3 +484,20 @@ def test_what_learning_is_up_against(tmp_path):
     assert gradient[["carbon", "carbon_low", "thaw", "thaw_low"]].tolist() == [20, 10, np.inf, 90]
     nothing = learning_difficulty.make(Results((TINY_RUNS,), experiments.jobs(), TINY_RUNS / "no studies"))
     assert all(text.startswith("not there: python analysis/") for text in nothing.quantity)
+
+
+# ----------------------------------------------------------------------------------- where they come from and go
+
+
+@pytest.mark.parametrize("module", [make_tables, make_figures])
+def test_folders_without_runs_are_named_in_one_line(module, tmp_path):
+    with pytest.raises(SystemExit, match=r"^error: --runs-dir .*nowhere: no such folder$"):
+        module.main(module.Args(runs_dir=(tmp_path / "nowhere",)))
+    with pytest.raises(SystemExit, match=r"^error: no finished run under .*; `python \S+zero_change.py` makes .*$"):
+        module.main(module.Args(runs_dir=(tmp_path,)))
+
+
+def test_a_users_tables_lie_beside_the_users_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    make_tables.main(make_tables.Args(runs_dir=(TINY_RUNS,)))
+    assert {path.relative_to(tmp_path).parts[:2] for path in tmp_path.rglob("*.csv")} == {("runs", "tables")}

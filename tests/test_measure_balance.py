@@ -1,8 +1,10 @@
 import numpy as np
+import pytest
 
 from analysis.studies import measure_balance
 
 
+@pytest.mark.slow
 def test_the_measured_scale_equalises_the_spreads(capsys, monkeypatch):
     args = measure_balance.Args(sites=2, years=3)
     play = measure_balance.play

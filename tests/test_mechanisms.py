@@ -57,6 +57,7 @@ def test_drawn_episodes_are_of_both_kinds():
     assert not drawn.equals(site_warming.drawn_episodes(episodes, seed=2, each=8))
 
 
+@pytest.mark.slow
 def test_a_study_is_made_once(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(reference, "PLANS", ("12", "24"))
     monkeypatch.setattr(reference, "cache_folder", lambda: tmp_path / "cache" / "kernels")

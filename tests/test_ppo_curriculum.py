@@ -300,6 +300,7 @@ def test_threshold_path_follows_from_the_episodes(finished_run):
         start = update.global_step
 
 
+@pytest.mark.slow
 def test_a_coins_run_resumes_to_the_same_bytes(tmp_path, monkeypatch):
     monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 256)
     arguments = ("--selector", "coin", "--update-epochs", 1)
@@ -411,6 +412,7 @@ def test_a_finished_run_is_left_alone(finished_run, capsys):
     assert before == {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in finished_run.iterdir()}
 
 
+@pytest.mark.slow
 def test_learns_the_toy(tmp_path):
     train(
         tmp_path,

@@ -1,3 +1,4 @@
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -92,6 +93,7 @@ def test_losses_and_their_gradient_are_those_of_an_independent_implementation(no
         assert (sums[0] - sums[1]) / (2 * h) == pytest.approx(parameter.grad.view(-1)[k].item(), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_learns_the_toy(tmp_path):
     run_script(
         "cleanrl_style/ppo_gated.py",
@@ -124,7 +126,7 @@ def test_learns_the_toy(tmp_path):
 
 
 def test_tracking_without_the_package_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "wandb", None)
     with pytest.raises(SystemExit, match="--track wandb: the package is not installed"):
         run_script("cleanrl_style/ppo_gated.py", "--track", "wandb", "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()

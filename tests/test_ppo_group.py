@@ -98,6 +98,7 @@ def test_values_are_of_their_unit_and_the_loss_of_none():
 # ------------------------------------------------------------------------------------------------- script
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_learns_the_toy(seed, tmp_path):
     train(

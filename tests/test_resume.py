@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+import torch
 from scripts import ROOT, run_script
 
 TOY = ("--env-id", "resumable_toy:resumable-toy-v0", "--total-timesteps", 1500, "--num-envs", 3, "--eval-episodes", 2)
@@ -92,10 +93,10 @@ def assert_same_bytes(folder, other):
 @pytest.mark.parametrize(
     "script, common, moments",
     [
-        ("ppo_curriculum", TOY, "any"),
-        ("ppo_curriculum", BOREAL_ASYNC, "checkpoint"),
-        ("ppo_gated", BOREAL, "checkpoint"),
-        ("eupg_var_lambda", BOREAL, "any"),
+        pytest.param("ppo_curriculum", TOY, "any", marks=pytest.mark.slow),
+        pytest.param("ppo_curriculum", BOREAL_ASYNC, "checkpoint", marks=pytest.mark.slow),
+        pytest.param("ppo_gated", BOREAL, "checkpoint", marks=pytest.mark.slow),
+        pytest.param("eupg_var_lambda", BOREAL, "any", marks=pytest.mark.slow),
         ("eupg_fixed_lambda", TOY, "any checkpoint"),
     ],
     ids=[
@@ -150,6 +151,7 @@ def test_ctrl_c_says_how_to_go_on(interrupted):
     assert (folder / "checkpoint.pt").exists() and not (folder / "evaluation.csv").exists()
 
 
+@pytest.mark.slow
 def test_sigterm_is_as_ctrl_c(tmp_path):
     process = start("eupg_var_lambda", tmp_path / "run", *arguments("eupg_var_lambda", TOY), TOY_SECONDS="0.01")
     wait_for_rows(process, tmp_path / "run", 1)
@@ -186,6 +188,24 @@ def test_a_damaged_checkpoint_is_refused(interrupted, tmp_path, harm):
     with pytest.raises(SystemExit, match="^error: .*checkpoint.pt is damaged.*--overwrite starts over"):
         resume(folder)
     assert before == {path: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("state", [[1], {"weights": 1}, {"script": "ppo_mine"}])
+def test_a_checkpoint_of_another_program_is_refused(interrupted, tmp_path, state):
+    folder = copy(interrupted, tmp_path)
+    torch.save(state, folder / "checkpoint.pt")
+    with pytest.raises(SystemExit, match="checkpoint.pt is no checkpoint of this version of ppo_gated; --overwrite"):
+        resume(folder)
+
+
+@pytest.mark.parametrize("part", ["agent", "optimizer"])
+def test_a_checkpoint_of_another_network_is_refused(interrupted, tmp_path, part):
+    folder = copy(interrupted, tmp_path)
+    state = torch.load(folder / "checkpoint.pt", weights_only=False)
+    state[part].popitem()
+    torch.save(state, folder / "checkpoint.pt")
+    with pytest.raises(SystemExit, match=f"checkpoint.pt: its {part} does not fit that of this ppo_gated; --overwrite"):
+        resume(folder)
 
 
 def test_a_table_shorter_than_its_checkpoint_is_refused(interrupted, tmp_path):
@@ -246,6 +266,7 @@ def test_an_environment_that_cannot_be_made_in_a_worker_ends_the_run(tmp_path):
     assert err.strip().splitlines()[-1] == "error: an environment could not be made: its error is above"
 
 
+@pytest.mark.slow
 def test_a_killed_worker_ends_the_run(interrupted, tmp_path):
     folder = copy(interrupted, tmp_path)
     process = start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_SECONDS="0.01")

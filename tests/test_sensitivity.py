@@ -111,6 +111,7 @@ def test_a_variant_is_played():
     assert row == pytest.approx((first + second) / 2, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_stopped_study_goes_on_with_the_groups_that_are_left(tmp_path, monkeypatch, capsys):
     chosen = ("default", "soil_respiration", "mature_age_limit", next(iter(sensitivity.ALTERNATIVES)))
     variants = [variant for variant in sensitivity.variants() if variant.factor in chosen]

@@ -110,6 +110,7 @@ def test_the_past_is_the_same_for_all_that_follows(tiny):
     assert (nothing[:, :, :, 0] != nothing[:, :, :, 1]).any(axis=-1).all()
 
 
+@pytest.mark.slow
 def test_the_same_bytes_again(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(signal_to_noise, "QUICK", TINY)
     monkeypatch.setattr(signal_to_noise.open_loop, "fingerprint", lambda: "physics")

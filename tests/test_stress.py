@@ -89,6 +89,7 @@ def test_failures_are_tabulated_and_end_the_script_with_the_command_that_replays
     assert "gpp_kgc_m2=" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_clean_run_ends_with_its_tables(tmp_path, capsys):
     run_script("analysis/stress.py", "--stand-years", 1, "--output-dir", tmp_path)
     residuals = pd.read_csv(tmp_path / "residuals.csv", index_col="group")

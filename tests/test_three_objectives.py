@@ -11,7 +11,7 @@ from analysis import make_tables
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts, run_folder
 
-SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("ppo_gated", "ppo_curriculum", "eupg_var_lambda")]
 OBJECTIVES = ["carbon", "thaw", "timber"]
 WEIGHTS = [f"weight_{name}" for name in OBJECTIVES]
 RETURNS = [f"{name}_return" for name in OBJECTIVES]
@@ -25,7 +25,7 @@ def train(script, folder, *more):
     run_script(f"cleanrl_style/{script}.py", *given, *rollout, *fixed, "--run-dir", folder, "--eval-episodes", 2, *more)
 
 
-@pytest.mark.parametrize("script", SCRIPTS)
+@pytest.mark.parametrize("script", [*SLOW, "eupg_fixed_lambda"])
 def test_a_third_objective_is_trained_evaluated_resumed_and_tabulated(script, tmp_path, monkeypatch):
     whole, stopped = tmp_path / "runs" / "whole", tmp_path / "stopped"
     monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 128)
@@ -75,6 +75,7 @@ def test_fixed_strategies_are_evaluated_too(script, tmp_path):
     np.testing.assert_allclose(evaluation.scalarized_return, dot, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_learning_follows_three_weights(tmp_path):
     """On the toy, whose best mixture for each weight is known."""
     corners = (1, 0, 0, 0, 1, 0, 0, 0, 1)

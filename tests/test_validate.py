@@ -191,6 +191,7 @@ def test_paragraphs_are_filled_and_tables_left_alone():
     assert text == "# Heading\n\nshort lines\n\n" + table
 
 
+@pytest.mark.slow
 def test_quick_run_writes_the_same_bytes_twice(tmp_path, capsys):
     for folder in ("first", "second"):
         run_script("analysis/validate.py", "--quick", "--parts", "seasons", "--output-dir", tmp_path / folder)
@@ -216,6 +217,7 @@ def test_every_miss_is_listed_and_parts_keep_their_order():
     assert text.index("first") < text.index("later") < text.index("| here | too low | a process |")
 
 
+@pytest.mark.slow
 def test_stands_run_free_and_experiments_in_a_quick_run(tmp_path, capsys):
     run_script("analysis/validate.py", "--quick", "--parts", "free", "field", "robustness", "--output-dir", tmp_path)
     text = (tmp_path / "validation.md").read_text()

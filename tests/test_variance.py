@@ -60,6 +60,7 @@ def test_what_explains_the_sites():
     assert nothing["rest"] == pytest.approx(1, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_tiny_design(tmp_path, monkeypatch):
     monkeypatch.setattr(variance, "YEARS", 2)
     variance.main(variance.Args(quick=True, output_dir=tmp_path))

@@ -1,12 +1,14 @@
-"""What every training script and heuristic shares, whatever its algorithm: the one import of the scripts.
+"""What every training script and heuristic shares, whatever its algorithm.
 
-A script reads its arguments (`parse`), asks the environment what it is (`make_task`), opens its folder (`Run`), trains
-on `run.make_envs()`, logs rows, shows `run.progress`, plays `run.validate` and saves checkpoints meanwhile, and ends
-with `run.save_policy`, `evaluate` and `run.finish`. `load_policy` gives a finished run's policy, or one that ships.
+A script reads its arguments (`parse`, of `cleanrl_style.flags`, which loads at once), asks the environment what
+it is (`make_task`), opens its folder (`Run`), trains on `run.make_envs()`, logs rows, shows `run.progress`, plays
+`run.validate` and saves checkpoints meanwhile, and ends with `run.save_policy`, `evaluate` and `run.finish`.
+`load_policy` gives a finished run's policy, or one that ships.
 """
 
+from cleanrl_style.flags import FIRST_EVALUATION_SEED, LIMITS, MAX_ENVS, fail, parse
 from cleanrl_style.protocol.agents import Policy, load_agent, load_policy, shipped_policies
-from cleanrl_style.protocol.arguments import LIMITS, MAX_ENVS, fail, make_task, not_default, parse
+from cleanrl_style.protocol.arguments import make_task, not_default
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.evaluation import POLICIES, evaluate
 from cleanrl_style.protocol.files import replacing
@@ -14,7 +16,7 @@ from cleanrl_style.protocol.flat import flat_parameters
 from cleanrl_style.protocol.fronts import scalarize
 from cleanrl_style.protocol.progress import Progress
 from cleanrl_style.protocol.run_folder import FLOAT_FORMAT, TIMING_COLUMNS, Run
-from cleanrl_style.protocol.sites import FIRST_EVALUATION_SEED, evaluation_seeds
+from cleanrl_style.protocol.sites import evaluation_seeds
 from cleanrl_style.protocol.task import EPISODE_INFO, Task, final_info
 from sim.task.preference import observed_weights
 

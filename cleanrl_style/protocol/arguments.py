@@ -1,84 +1,24 @@
-"""The arguments that the training scripts and heuristics share: how they are read, filled in and checked."""
+"""The arguments that the training scripts and heuristics share: how they are filled in and checked."""
 
 import contextlib
 import dataclasses
 import importlib.util
-import io
-import sys
 
 import gymnasium as gym
 import numpy as np
-import tyro
 
 import boreal_env
+from cleanrl_style.flags import check_limits, fail
 from cleanrl_style.protocol.fronts import evaluation_weights, return_columns
 from cleanrl_style.protocol.reference import reference_returns
-from cleanrl_style.protocol.sites import FIRST_EVALUATION_SEED, evaluation_seeds, published_seeds
+from cleanrl_style.protocol.sites import evaluation_seeds, published_seeds
 from cleanrl_style.protocol.task import Task
 from cleanrl_style.protocol.utility import Utility
 
-MAX_ENVS = 1000
 ONE_SITE_EPISODES = 32  # that an ideal point is taken from, where a task has one site under many weathers
 DEFAULT_STEPS = {"generalist": 300_000, "site-specific": 100_000}  # of a training, by the environment's mode
 # Arguments that change nothing in what a run computes.
 FREE_ARGUMENTS = ("run_dir", "overwrite", "track", "wandb_project_name")
-
-# Closed interval of each argument that has one.
-LIMITS = {
-    "seed": (0, FIRST_EVALUATION_SEED // MAX_ENVS - 1),
-    "site_seed": (0, 2**63 - 1),
-    "total_timesteps": (1, 10**12),
-    "num_envs": (1, MAX_ENVS),
-    "eval_episodes": (1, 10**6),
-    "eval_weights": (0, 1),
-    "learning_rate": (0, 1),
-    "gamma": (0, 1),
-    "gae_lambda": (0, 1),
-    "rollout_steps": (1, 10**9),
-    "minibatch_size": (2, 10**9),
-    "update_epochs": (1, 10**6),
-    "clip_coef": (0, 10),
-    "ent_coef": (0, 10),
-    "vf_coef": (0, 10),
-    "max_grad_norm": (0, 10**6),
-    "reward_scales": (0, 10**6),
-    "threshold": (0, 1),
-    "preference": (0, 1),
-}
-
-
-def fail(message: str):
-    """End the script with one line on stderr and a non-zero exit."""
-    sys.exit(f"error: {message}")
-
-
-def describe(arguments: type) -> str:
-    """What `--help` says of a script: of one that trains how to try it, and what becomes of it."""
-    if not hasattr(arguments, "vectorization"):
-        return arguments.__doc__
-    return f"""{arguments.__doc__}
-
-    python {sys.argv[0]} --vectorization lockstep --total-timesteps 32000 --eval-episodes 20
-
-is a trial of a minute on two cores. Without the last two flags it trains for 300,000 steps and is evaluated on 200
-sites, for ten minutes. A stopped run goes on with the same command, to the same bytes. The folder gets config.json,
-episodes.csv, updates.csv, validation.csv, evaluation.csv, policy.pt and summary.png, which docs/algorithms
-explains; python analysis/make_tables.py sets it beside other runs."""
-
-
-def parse(arguments: type):
-    """The command line as an instance of `arguments`; a bad flag or value ends the script with one line."""
-    errors = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(errors):
-            return tyro.cli(arguments, description=describe(arguments))
-    except SystemExit as end:
-        if not end.code:
-            raise
-    # tyro draws a box: its message, a rule, then help on the flag
-    lines = [line.strip("│ ") for line in errors.getvalue().splitlines() if line.startswith("│")]
-    rules = [i for i, line in enumerate(lines) if line.startswith("─")]
-    fail(" ".join(lines[: rules[0] if rules else None]) or errors.getvalue().strip())
 
 
 def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -> Task:
@@ -88,11 +28,7 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
     hide_site : whether its site parameters are left out of the observation. env_kwargs : more of its arguments.
     Exits with one line that names the bad value and what is allowed.
     """
-    for name, (low, high) in LIMITS.items():
-        given = getattr(args, name, None)
-        for value in [] if given is None else np.ravel(given).tolist():
-            if not low <= value <= high:
-                fail(f"--{name.replace('_', '-')} must lie in [{low}, {high}], not {value}")
+    check_limits(args)
     args.env_id = name_environment(args)
     registered = ask(args.env_id)  # as it is without the flags
     fill_in(args, registered)

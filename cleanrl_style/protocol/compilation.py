@@ -1,6 +1,7 @@
 """The physics is compiled when a machine first needs it: what is needed now with a sign of life, the rest meanwhile."""
 
 import contextlib
+import logging
 import multiprocessing
 import os
 import signal
@@ -10,6 +11,7 @@ from collections.abc import Iterable
 
 from sim.block import is_compiled, kernel
 
+LOGGER = logging.getLogger("sim.block")  # it says in one line, on stderr, what is said here
 INTERVAL = 5.0  # seconds between signs of life
 _UNDER_WAY: dict[int, multiprocessing.Process] = {}  # by lanes, what is compiled in the background
 
@@ -52,6 +54,7 @@ def finish(lanes: int) -> None:
 def compile_apart(lanes: int) -> None:
     """Compile in a process of its own, which leaves Ctrl-C to the main one, and the processor to who needs it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    LOGGER.disabled = True
     os.nice(5)
     kernel(lanes)
 
@@ -68,9 +71,11 @@ def alive(what: str):
 
     teller = threading.Thread(target=tell, daemon=True)
     teller.start()
+    LOGGER.disabled = True
     try:
         yield
     finally:
+        LOGGER.disabled = False
         done.set()
         teller.join()
     print(f"  compiled in {time.perf_counter() - start:.0f} s", flush=True)

@@ -21,8 +21,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
+from cleanrl_style.flags import fail
 from cleanrl_style.protocol import tracking, training_envs
-from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, fail, not_default
+from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, not_default
 from cleanrl_style.protocol.course import Course
 from cleanrl_style.protocol.evaluation import PRIMARY, episodes_by_policy, lanes_of_evaluation
 from cleanrl_style.protocol.files import replacing
@@ -197,6 +198,7 @@ class Run:
 
         start = time.perf_counter()
         state |= {
+            "script": self.script,
             "global_step": global_step,
             "envs": training_envs.get_states(self.envs),
             "random_states": (random.getstate(), np.random.get_state(), torch.get_rng_state()),
@@ -220,10 +222,19 @@ class Run:
             with zipfile.ZipFile(path) as archive:
                 damaged = archive.testzip()  # torch does not look at the checksums that it wrote
             checkpoint = None if damaged else torch.load(path, weights_only=False)
-        except (zipfile.BadZipFile, RuntimeError, EOFError, pickle.UnpicklingError) as error:
+        except (
+            zipfile.BadZipFile,
+            RuntimeError,
+            EOFError,
+            pickle.UnpicklingError,
+            ImportError,
+            AttributeError,
+        ) as error:
             damaged = str(error).splitlines()[0]
         if damaged:
             fail(f"{path} is damaged ({damaged}); --overwrite starts over")
+        if not isinstance(checkpoint, dict) or checkpoint.get("script") != self.script:
+            fail(f"{path} is no checkpoint of this version of {self.script}; --overwrite starts over")
         for name, size in checkpoint["table_sizes"].items():
             table = self.folder / f"{name}.csv"
             if not table.exists() or table.stat().st_size < size:
@@ -233,11 +244,20 @@ class Run:
             return
         self.checkpoint, self.checkpoint_step = checkpoint, checkpoint["global_step"]
 
-    def resume(self) -> dict | None:
-        """Set environments and generators as in the checkpoint, and give its state; None if there is none."""
+    def resume(self, **parts) -> dict | None:
+        """Set environments, generators and `parts` as in the checkpoint, and give its state; None if there is none.
+
+        parts : what has a `load_state_dict` (networks, optimizers), under the names that `save` was given.
+        """
         if self.checkpoint:
             import torch
 
+            for name, part in parts.items():
+                try:
+                    part.load_state_dict(self.checkpoint[name])
+                except (KeyError, ValueError, RuntimeError):
+                    path = self.folder / "checkpoint.pt"
+                    fail(f"{path}: its {name} does not fit that of this {self.script}; --overwrite starts over")
             training_envs.set_states(self.envs, self.checkpoint["envs"])
             python_state, numpy_state, torch_state = self.checkpoint["random_states"]
             random.setstate(python_state)

@@ -4,10 +4,9 @@ import csv
 import functools
 from importlib.resources import files
 
+from cleanrl_style.flags import FIRST_EVALUATION_SEED
 from cleanrl_style.protocol.task import Task
 
-# Training resets environments with seeds below this one, evaluation from this one on.
-FIRST_EVALUATION_SEED = 1_000_000_000
 SPLITS = ("test", "validation")  # results are of the first; variants and budgets are chosen on the second
 TABLE = "evaluation_sites.csv"  # written by analysis/choose_sites.py
 

@@ -1,0 +1,148 @@
+"""The command line of a script: its flags, and what it says when it cannot go on.
+
+It loads nothing slow: a bad flag, or a package that is not installed, is answered before torch and the physics come.
+"""
+
+import atexit
+import contextlib
+import errno
+import importlib.util
+import io
+import os
+import sys
+
+MAX_ENVS = 1000
+# Training resets environments with seeds below this one, evaluation from this one on.
+FIRST_EVALUATION_SEED = 1_000_000_000
+
+# Closed interval of each argument that has one.
+LIMITS = {
+    "seed": (0, FIRST_EVALUATION_SEED // MAX_ENVS - 1),
+    "site_seed": (0, 2**63 - 1),
+    "total_timesteps": (1, 10**12),
+    "num_envs": (1, MAX_ENVS),
+    "eval_episodes": (1, 10**6),
+    "eval_weights": (0, 1),
+    "learning_rate": (0, 1),
+    "gamma": (0, 1),
+    "gae_lambda": (0, 1),
+    "rollout_steps": (1, 10**9),
+    "minibatch_size": (2, 10**9),
+    "update_epochs": (1, 10**6),
+    "clip_coef": (0, 10),
+    "ent_coef": (0, 10),
+    "vf_coef": (0, 10),
+    "max_grad_norm": (0, 10**6),
+    "reward_scales": (0, 10**6),
+    "threshold": (0, 1),
+    "preference": (0, 1),
+}
+
+
+def fail(message: str):
+    """End the script with one line on stderr and a non-zero exit."""
+    sys.exit(f"error: {message}")
+
+
+def require(*packages: str) -> None:
+    """End the script if one of the packages of the extra `train` is not installed."""
+    missing = [name for name in packages if importlib.util.find_spec(name) is None]
+    if missing:
+        fail(f"not installed: {', '.join(missing)}; in the project's folder: pip install -e '.[train]'")
+
+
+def describe(arguments: type) -> str:
+    """What `--help` says of a script: of one that trains how to try it, and what becomes of it."""
+    if not hasattr(arguments, "total_timesteps"):
+        return arguments.__doc__
+    return f"""{arguments.__doc__}
+
+    python {sys.argv[0]} --vectorization lockstep --total-timesteps 32000 --eval-episodes 20
+
+is a trial of a minute on two cores. Without the last two flags it trains for 300,000 steps and is evaluated on 200
+sites, for ten minutes. A stopped run goes on with the same command, to the same bytes. The folder gets config.json,
+episodes.csv, updates.csv, validation.csv, evaluation.csv, policy.pt and summary.png, which docs/algorithms
+explains; python analysis/make_tables.py sets it beside other runs."""
+
+
+def parse(arguments: type):
+    """The command line as an instance of `arguments`; a bad flag or value ends the script with one line."""
+    prepare_output()
+    require("tyro", "matplotlib", "moocore", *(["torch"] if hasattr(arguments, "total_timesteps") else []))
+    import tyro
+
+    errors = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(errors):
+            args = tyro.cli(arguments, description=describe(arguments))
+    except SystemExit as end:
+        if not end.code:
+            raise
+        fail(message_of(errors.getvalue()))
+    check_limits(args)
+    return args
+
+
+def message_of(box: str) -> str:
+    """What tyro says in its box: a title, its message, and below a rule help on the flag."""
+    lines = [line.strip("│ ") for line in box.splitlines()]
+    rules = [i for i, line in enumerate(lines) if line.startswith(("───", "---", "╰─"))]
+    first = 2 if rules[0] == 1 else 1  # drawn in ASCII, the title has a rule of its own
+    return " ".join(filter(None, lines[first : rules[first - 1]]))
+
+
+def check_limits(args) -> None:
+    """End the script with one line that names an argument outside its limits, and them."""
+    for name, (low, high) in LIMITS.items():
+        value = getattr(args, name, None)
+        for number in flat(value):
+            if not low <= number <= high:
+                fail(f"--{name.replace('_', '-')} must lie in [{low}, {high}], not {number}")
+
+
+def flat(value) -> list:
+    """The numbers of a number, of tuples of them, or of None."""
+    if value is None:
+        return []
+    return [number for part in value for number in flat(part)] if isinstance(value, (tuple, list)) else [value]
+
+
+# ------------------------------------------------------------------------------------------------------ the terminal
+
+
+def prepare_output() -> None:
+    """Have the script write to any terminal, file or pipe: what an encoding lacks is a "?", a closed one takes all."""
+    sys.stdout, sys.stderr = (stream or open(os.devnull, "w") for stream in (sys.stdout, sys.stderr))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    if sys.excepthook is not end_quietly:
+        sys.excepthook = end_quietly
+        atexit.register(flush)
+
+
+def end_quietly(kind, error, trace) -> None:
+    """A line for Ctrl-C, `| head` and a full disk, which are no errors of the script; of all else the traceback."""
+    if issubclass(kind, KeyboardInterrupt):
+        print("\ninterrupted", file=sys.stderr)
+    elif issubclass(kind, BrokenPipeError):
+        print("stopped: nobody reads the output any more", file=sys.stderr)
+        to_nobody()
+    elif isinstance(error, OSError) and error.errno == errno.ENOSPC:
+        print(f"error: {error}", file=sys.stderr)
+        to_nobody()
+    else:
+        sys.__excepthook__(kind, error, trace)
+
+
+def flush() -> None:
+    """Write what is left; the interpreter itself would complain if its reader has gone."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        to_nobody()
+
+
+def to_nobody() -> None:
+    """Send the rest of the output nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

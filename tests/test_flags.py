@@ -1,0 +1,106 @@
+"""What a script says at once: of a bad flag, of a missing package, of a terminal that cannot take its output."""
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from scripts import ROOT, run_script
+
+from cleanrl_style import flags
+
+SCRIPTS = sorted(path.stem for path in (ROOT / "cleanrl_style").glob("*.py") if "\nclass Agent" in path.read_text())
+
+
+def python(*arguments, **options):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "", **options.pop("env", {})}
+    return subprocess.Popen(
+        [sys.executable, *map(str, arguments)], stderr=subprocess.PIPE, text=True, env=environment, **options
+    )
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_a_bad_flag_is_answered_before_anything_slow_is_loaded(script):
+    _, err = python("-X", "importtime", ROOT / "cleanrl_style" / f"{script}.py", "--sed", "3").communicate()
+    *loaded, answer = err.splitlines()
+    assert answer.startswith("error: Unrecognized options: --sed")
+    assert not {"torch", "numba", "pandas", "gymnasium"} & {line.split("|")[-1].strip() for line in loaded}
+
+
+def test_a_fixed_strategy_answers_as_soon():
+    _, err = python("-X", "importtime", ROOT / "baselines_heuristic" / "zero_change.py", "--seed", "x").communicate()
+    assert err.splitlines()[-1].startswith("error: Error parsing --seed: ")
+    assert " numba\n" not in err
+
+
+@pytest.mark.parametrize(
+    "script, package", [("cleanrl_style/ppo_gated.py", "torch"), ("baselines_heuristic/zero_change.py", "tyro")]
+)
+def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, script, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(SystemExit, match=rf"^error: not installed: {package}; .*pip install -e '\.\[train\]'$"):
+        run_script(script)
+
+
+@pytest.mark.parametrize(
+    "given, message",
+    [
+        (["--seed", "-1"], r"--seed must lie in \[0, 999999\], not -1"),
+        (["--eval-weights", "0", "2"], r"--eval-weights must lie in \[0, 1\], not 2.0"),
+        (["--learning-rate", "nan"], r"--learning-rate must lie in \[0, 1\], not nan"),
+        (["--mode", "both"], "(.*both.*--mode|.*--mode.*both).*"),
+        (["--num-envs", "many"], "Error parsing --num-envs: .*'many'.*"),
+        (["--seed"], ".*--seed.*"),
+    ],
+)
+def test_a_bad_value_is_named(given, message):
+    with pytest.raises(SystemExit, match=f"^error: {message}$"):
+        run_script("cleanrl_style/ppo_gated.py", *given)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_any_encoding_will_do(encoding):
+    script = "from cleanrl_style.flags import prepare_output; prepare_output(); print('kgC m⁻²')"
+    process = python("-c", script, stdout=subprocess.PIPE, env={"PYTHONIOENCODING": encoding}, encoding=encoding)
+    assert process.communicate() == ("kgC m??\n" if encoding == "ascii" else "kgC m?²\n", "")
+    path = ROOT / "cleanrl_style" / "ppo_gated.py"
+    _, err = python(path, "--sed", "3", env={"PYTHONIOENCODING": encoding}).communicate()
+    assert err.startswith("error: Unrecognized options: --sed") and err.count("\n") == 1
+
+
+LINES = "from cleanrl_style.flags import prepare_output; prepare_output()\nfor i in range({}): print(i)"
+
+
+@pytest.mark.parametrize(
+    "lines, code, said", [(10, 0, ""), (100_000, 1, "stopped: nobody reads the output any more\n")]
+)
+def test_a_closed_pipe_is_a_line_at_most(lines, code, said):
+    process = python("-c", LINES.format(lines), stdout=subprocess.PIPE)
+    process.stdout.close()
+    assert (process.stderr.read(), process.wait()) == (said, code)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_is_a_line():
+    with open("/dev/full", "w") as full:
+        process = python("-c", LINES.format(100_000), stdout=full)
+    assert (process.stderr.read(), process.wait()) == ("error: [Errno 28] No space left on device\n", 1)
+
+
+def test_ctrl_c_is_a_line(capsys):
+    flags.end_quietly(KeyboardInterrupt, KeyboardInterrupt(), None)
+    assert capsys.readouterr().err == "\ninterrupted\n"
+
+
+def test_a_script_without_a_terminal_works(monkeypatch):
+    @dataclass
+    class Args:
+        """Nothing."""
+
+        seed: int = 1
+
+    monkeypatch.setattr(sys, "stdout", None)
+    monkeypatch.setattr(sys, "argv", ["script.py", "--seed", "2"])
+    assert flags.parse(Args).seed == 2
