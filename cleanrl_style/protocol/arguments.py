@@ -15,6 +15,7 @@ from cleanrl_style.protocol.fronts import evaluation_weights
 from cleanrl_style.protocol.sites import FIRST_EVALUATION_SEED, evaluation_seeds
 from cleanrl_style.protocol.task import Task
 
+#: Environments that a training may have, at most.
 MAX_ENVS = 1000
 DEFAULT_STEPS = {"generalist": 300_000, "site-specific": 100_000}  # of a training, by the environment's mode
 # Arguments that change nothing in what a run computes.
