@@ -1,5 +1,7 @@
 """What README.md and docs/results.md say first: six rows of the main table, and what all its rows say, in words."""
 
+import textwrap
+
 import numpy as np
 
 from analysis import methods
@@ -43,8 +45,8 @@ def six_rows(results) -> str:
     text += f"| the best constant plan of each preference | | {' | '.join(plans)} |\n"
     for script in SIX:
         of_worlds = [rows[env_id].get(script, []) for env_id in WORLDS]
-        seeds = max(map(len, of_worlds))
-        what = (str(seeds) if script in methods.TRAINED else "") if seeds else "not run yet"
+        seeds = " and ".join(dict.fromkeys(str(len(replicates)) for replicates in of_worlds if replicates))
+        what = (seeds if script in methods.TRAINED else "") if seeds else "not run yet"
         cells = [shown(main_results.scores(replicates)) if replicates else "" for replicates in of_worlds]
         text += f"| {methods.title(script)} | {what} | {' | '.join(cells)} |\n"
     return text
@@ -53,7 +55,7 @@ def six_rows(results) -> str:
 def in_words(results) -> str:
     """A paragraph for each world: who is ahead, and whether the preference is followed."""
     paragraphs = [paragraph(results, env_id) for env_id in WORLDS]
-    return "\n".join(filter(None, paragraphs)) or "No runs yet.\n"
+    return "".join(paragraphs) or "No runs yet.\n"
 
 
 def paragraph(results, env_id: str) -> str:
@@ -69,8 +71,8 @@ def paragraph(results, env_id: str) -> str:
     beat = [script for script in trained if known[script] > 100.0]
     text = (
         f"- **`{env_id}`.** Planting 100 stems a year without looking scores {known[PLANTING]:.0f}. The best of "
-        f"{len(trained)} trained methods is {methods.title(best)} with {shown(scores[best])}. "
-        f"{named(above)} above planting; {named(beat)} above 100."
+        f"{len(trained)} trained methods is {methods.title(best)} with {shown(scores[best])}; "
+        f"{named(above)} above planting, {named(beat)} above 100."
     )
     followed = {
         script: main_results.row_of_runs((script, env_id, "default"), rows[script])
@@ -79,10 +81,11 @@ def paragraph(results, env_id: str) -> str:
     }
     carbon = [script for script, row in followed.items() if row["carbon_change_low"] > 0.0]
     thaw = [script for script, row in followed.items() if row["thaw_change_high"] < 0.0]
-    return (
-        f"{text} Asked for carbon instead of thaw, {named(carbon, 'store')} more carbon for it; asked for thaw instead "
-        f"of carbon, {named(thaw, 'keep')} more cold in the ground (intervals over training seeds without 0).\n"
+    text += (
+        f" Asked for carbon instead of thaw, {named(carbon, 'store')} more carbon for it; asked for thaw instead of "
+        f"carbon, {named(thaw, 'keep')} more cold in the ground (intervals over training seeds without 0)."
     )
+    return textwrap.fill(text, 120, subsequent_indent="  ", break_on_hyphens=False) + "\n"
 
 
 def named(scripts: list[str], verb: str = "") -> str:

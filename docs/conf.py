@@ -22,7 +22,13 @@ project_copyright = f"{author}, MIT licence"
 release = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 
 root_doc = "docs/index"
-include_patterns = ["docs/**", "CONTRIBUTING.md", "CHANGELOG.md", "analysis/observations/README.md", "results/README.md"]
+include_patterns = [
+    "docs/**",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "analysis/observations/README.md",
+    "results/README.md",
+]
 exclude_patterns = ["build", "runs", "results/runs", ".*", "**/__pycache__"]
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinxcontrib.mermaid"]
@@ -30,10 +36,11 @@ myst_enable_extensions = ["dollarmath"]
 myst_fence_as_directive = ["math", "mermaid"]  # GitHub's way to write them
 myst_heading_anchors = 4
 nb_execution_mode = "off"  # analysis/execute_notebooks.py does it, and a test tells whether they are current
-suppress_warnings = ["toc.empty_glob"]  # pages that are listed where they will be
 
 nitpicky = True
-nitpick_ignore_regex = [("py:.*", r"(?!boreal_env|sim\b|cleanrl_style).*")]  # names of other libraries
+nitpick_ignore_regex = [
+    ("py:.*", r"(?!boreal_env|sim\.(?!task)|cleanrl_style).*")
+]  # other libraries, and what is not public
 autodoc_member_order = "bysource"
 autodoc_default_options = {"no-value": True}
 default_role = "literal"  # docstrings are Markdown: `name` is code
@@ -48,12 +55,17 @@ html_additional_pages = {"index": "to_index.html"}
 html_show_sourcelink = False
 
 ANCHOR = re.compile(r'^<a id="([\w-]+)"></a>$', re.MULTILINE)
-PARAMETERS = re.compile(r"^(?P<names>\*{0,2}\w+(?:, \*{0,2}\w+)*) : ", re.MULTILINE)
+PARAMETER = re.compile(r"(\w+(?:, \w+)*) : ")
 
 
-def anchors(app, docname, source):
-    """Anchors as GitHub wants them become those that MyST links to."""
-    source[0] = ANCHOR.sub(r"(\1)=", source[0])
+def as_myst(app, docname, source):
+    """Anchors as GitHub wants them become those that MyST links to; a list of pages is of those that are there."""
+    text = ANCHOR.sub(r"(\1)=", source[0])
+    if docname == root_doc:
+        patterns = re.findall(r"^\S+\*$", text, re.MULTILINE)
+        for pattern in (pattern for pattern in patterns if not any(Path(__file__).parent.glob(pattern + ".*"))):
+            text = text.replace(f"{pattern}\n", "")
+    source[0] = text
 
 
 def docstring(app, what, name, thing, options, lines):
@@ -66,10 +78,23 @@ def docstring(app, what, name, thing, options, lines):
         description = lines.index("## Description")
         lines[:] = [*lines[description + 1 : lines.index("", description)], ""]
     text = inspect.cleandoc("\n".join(lines))
-    text = re.sub(r"^(\w+)\n-+$", r"**\1**\n", text, flags=re.MULTILINE)
-    text = re.sub(r"\*(?=\*?\w)", r"\\*", text)
-    text = PARAMETERS.sub(lambda match: f"\n- `{match['names']}` : ", text)
-    lines[:] = [*text.splitlines(), ""]
+    text = re.sub(r"^(\w+)\n-+\n", r"**\1**\n\n", text, flags=re.MULTILINE)  # Parameters, Returns, Raises
+    text = re.sub(r"\*(?=\*?\w)(?<!\*\*)(?!\*?\w+\*\*)", r"\\*", text)
+    lines[:] = [*"\n\n".join(map(listed, text.split("\n\n"))).splitlines(), ""]
+
+
+def listed(paragraph: str) -> str:
+    """A paragraph of `name : meaning` as a list, if it is nothing else."""
+    first, *others = re.sub(r",\n(?=\w+ : )", ", ", paragraph).splitlines() or [""]
+    if not PARAMETER.match(first) or not all(line.startswith("  ") or PARAMETER.match(line) for line in others):
+        return paragraph if first.startswith((" ", ">", "-")) else "\n".join(map(str.strip, paragraph.splitlines()))
+    items = [[]]
+    for line in (first, *others):
+        if PARAMETER.match(line):
+            items.append([PARAMETER.sub(r"- `\1`: ", line)])
+        else:
+            items[-1].append(f"  {line.strip()}")
+    return "\n".join(line for item in items for line in item)
 
 
 def comment(module: str, constant: str) -> str:
@@ -90,6 +115,6 @@ def without_menu(app, pagename, templatename, context, doctree):
 
 def setup(app):
     """Sphinx calls this."""
-    app.connect("source-read", anchors)
+    app.connect("source-read", as_myst)
     app.connect("autodoc-process-docstring", docstring)
     app.connect("html-page-context", without_menu, priority=900)

@@ -84,7 +84,9 @@ def test_what_follow_readme_does_is_what_the_readme_says():
 
 
 def test_follow_readme_times_commands_and_names_the_one_that_fails(tmp_path):
-    table, printed = follow_readme.follow(["python -c 'print(7)'"], tmp_path, {"PATH": str(Path(sys.executable).parent)})
+    table, printed = follow_readme.follow(
+        ["python -c 'print(7)'"], tmp_path, {"PATH": str(Path(sys.executable).parent)}
+    )
     assert list(table.command) == ["python"] and printed == {"python -c 'print(7)'": "7\n"}
     with pytest.raises(SystemExit, match="python -c 1/0: exit 1"):
         follow_readme.follow(["python -c 1/0"], tmp_path, {"PATH": str(Path(sys.executable).parent)})

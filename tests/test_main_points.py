@@ -15,7 +15,10 @@ SCORES = {"plus_100": 70.0, "eupg_var_lambda": 60.0, "ppo_gated": 80.0, "ppo_gro
 def results(monkeypatch):
     """Rows of one world, a replicate being the script's name; two of the three trained follow one objective."""
     rows = {(script, WORLD, "vectorization=lockstep"): [script] for script in SCORES if script != "best"}
-    rows |= {("ppo_gated", WORLD, "ent_coef=0.0, vectorization=lockstep"): ["ppo_group"], ("ppo_curriculum", WORLD, "default"): []}
+    rows |= {
+        ("ppo_gated", WORLD, "ent_coef=0.0, vectorization=lockstep"): ["ppo_group"],
+        ("ppo_curriculum", WORLD, "default"): [],
+    }
     changes = {"eupg_var_lambda": (-1.0, 1.0), "ppo_gated": (0.5, 0.1), "ppo_group": (0.5, -0.1)}
 
     def scores(replicates):
@@ -46,11 +49,11 @@ def test_six_rows(results):
 
 
 def test_the_words_follow_from_the_numbers(results):
-    assert main_points.in_words(results) == (
-        "- **`boreal-balanced-v0`.** Planting 100 stems a year without looking scores 70. The best of 3 trained methods "
-        "is Group PPO with 110 [105, 115]. PPO Gated and Group PPO are above planting; Group PPO is above 100. Asked for "
-        "carbon instead of thaw, PPO Gated and Group PPO store more carbon for it; asked for thaw instead of carbon, "
-        "Group PPO keeps more cold in the ground (intervals over training seeds without 0).\n"
+    assert " ".join(main_points.in_words(results).split()) == (
+        "- **`boreal-balanced-v0`.** Planting 100 stems a year without looking scores 70. The best of 3 trained "
+        "methods is Group PPO with 110 [105, 115]; PPO Gated and Group PPO are above planting, Group PPO is above 100. "
+        "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it; asked for thaw instead of carbon, "
+        "Group PPO keeps more cold in the ground (intervals over training seeds without 0)."
     )
 
 

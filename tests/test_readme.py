@@ -46,7 +46,9 @@ def test_times_are_shown_in_minutes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert "Not timed yet" in excerpts.times()
     (tmp_path / "results").mkdir()
-    (tmp_path / "results" / "readme.csv").write_text("command,seconds,machine\npytest,330,2 cores of X\npip,61,2 cores of X\n")
+    (tmp_path / "results" / "readme.csv").write_text(
+        "command,seconds,machine\npytest,330,2 cores of X\npip,61,2 cores of X\n"
+    )
     assert excerpts.times() == "*On 2 cores of X: `pytest` 6 min, `pip` 61 s.*\n"
 
 
