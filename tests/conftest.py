@@ -10,7 +10,7 @@ from sim import block
 from sim.jit import cache_folder
 
 # Files that train, run a study or a script's process, or need every kernel; `pytest -m quick` leaves them out.
-SLOW = """agents archive backends benchmark claims cuda document_results eupg fronts heuristics hosts make_figures
+SLOW = """agents archive backends benchmark claims cuda docs document_results eupg fronts heuristics hosts make_figures
 make_tables measure_balance mechanisms new_method picture ppo_curriculum ppo_gated ppo_group protocol resume scaling
 sensitivity signal_to_noise soil_column stand_development stress three_objectives training_gains validate variance
 warming"""

@@ -52,8 +52,8 @@ def test_the_words_follow_from_the_numbers(results):
     assert " ".join(main_points.in_words(results).split()) == (
         "- **`boreal-balanced-v0`.** Planting 100 stems a year without looking scores 70. The best of 3 trained "
         "methods is Group PPO with 110 [105, 115]; PPO Gated and Group PPO are above planting, Group PPO is above 100. "
-        "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it; asked for thaw instead of carbon, "
-        "Group PPO keeps more cold in the ground (intervals over training seeds without 0)."
+        "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it; asked for thaw "
+        "instead of carbon, Group PPO keeps more cold in the ground (intervals over training seeds without 0)."
     )
 
 
