@@ -33,7 +33,7 @@ class Args:
 def executed(path: Path) -> nbformat.NotebookNode:
     """A notebook as it is when it has just been run from top to bottom in the repository."""
     notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(notebook, timeout=600, kernel_name="python3", record_timing=False)
+    client = NotebookClient(notebook, timeout=3600, kernel_name="python3", record_timing=False)
     client.execute(cwd=str(FOLDER.parents[1]))
     notebook.metadata = {"kernelspec": KERNEL, "language_info": LANGUAGE}
     for cell in notebook.cells:

@@ -38,9 +38,8 @@ myst_heading_anchors = 4
 nb_execution_mode = "off"  # analysis/execute_notebooks.py does it, and a test tells whether they are current
 
 nitpicky = True
-nitpick_ignore_regex = [
-    ("py:.*", r"(?!boreal_env|sim\.(?!task)|cleanrl_style).*")
-]  # other libraries, and what is not public
+# strict for our public names alone, not for those of other libraries
+nitpick_ignore_regex = [("py:.*", r"(?!(boreal_env|sim|cleanrl_style\.protocol)\.\w+$).*")]
 autodoc_member_order = "bysource"
 autodoc_default_options = {"no-value": True}
 default_role = "literal"  # docstrings are Markdown: `name` is code

@@ -111,8 +111,12 @@ def test_the_site_builds_without_a_warning(tmp_path):
         assert f'id="{name}"' in names
 
 
-def test_notebooks_are_current():
+@pytest.mark.parametrize("path", sorted(ROOT.glob("docs/notebooks/*.ipynb")), ids=lambda path: path.stem)
+def test_notebooks_are_current(path):
     pytest.importorskip("nbclient")
     from analysis import execute_notebooks
 
-    execute_notebooks.main(execute_notebooks.Args(check=True))
+    ships = (ROOT / "cleanrl_style" / "policies" / "ppo_group.pt").exists()
+    if "load_policy" in path.read_text(encoding="utf-8") and not ships:
+        pytest.skip("no policy ships yet")
+    execute_notebooks.main(execute_notebooks.Args(notebooks=(path,), check=True))
