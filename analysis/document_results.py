@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import excerpts, experiments, methods, metrics, paths
-from analysis.experiments import GENERALIST
+from analysis import excerpts, experiments, main_points, methods, metrics, paths
+from analysis.experiments import BALANCED, GENERALIST
 from analysis.results import Results
 from analysis.tables import distance_to_best, main_results, runtime, single_sites
 from analysis.tables.common import over_seeds
@@ -23,8 +23,10 @@ from cleanrl_style import protocol
 
 PAGES = (
     "README.md",
+    "docs/start.md",
     "docs/learning.md",
     "docs/performance.md",
+    "docs/results.md",
     "docs/scaling.md",
     "docs/outside.md",
     *(f"docs/algorithms/{name}.md" for name in methods.scripts(methods.CONDITIONED, methods.FIXED_WEIGHT)),
@@ -104,7 +106,8 @@ def rows_of(results: Results, script: str, environment: str | None = None) -> li
     for (_, env_id, setting), replicates in found:
         parts = [flags(setting), "" if env_id in (GENERALIST, environment) else f"`{env_id}`"]
         title = ", ".join(filter(None, parts)) or "default"
-        papers = published.get(methods.paper_name(script), np.nan) if title == "default" else np.nan
+        is_papers = title == "default" and env_id == GENERALIST
+        papers = published.get(methods.paper_name(script), np.nan) if is_papers else np.nan
         titled.append((title, replicates, papers, script in methods.TRAINED))
     return sorted(titled, key=lambda row: row[0] != "default")
 
@@ -115,13 +118,13 @@ def named(script: str, rows: list) -> list:
     return [(name if title == "default" else f"{name}, {title}", *rest) for title, *rest in rows]
 
 
-def plans(results: Results) -> list[tuple[str, list]]:
-    """Rows of the constant plans of the generalist environment, if their study is there."""
+def plans(results: Results, environment: str) -> list[tuple[str, list]]:
+    """Rows of the constant plans of an environment, if their study is there."""
     found = main_results.constant_plans(results)
     return [
-        (title, found[name, GENERALIST, "default"])
+        (title, found[name, environment, "default"])
         for name, (title, _) in main_results.CONSTANT_PLANS.items()
-        if found[name, GENERALIST, "default"]
+        if found[name, environment, "default"]
     ]
 
 
@@ -178,30 +181,37 @@ def other_libraries(results: Results) -> str:
 
 
 def section(results: Results, name: str) -> str:
-    """What stands between the comments: of all methods, of the heuristics, of one script, or another table."""
+    """What stands between the comments: of all methods in a world, of the heuristics, of one script, another table."""
     if name in EXCERPTS:
         return EXCERPTS[name]()
     if name in TABLES:
         return TABLES[name](results)
     rows = []
-    if name == "all":
+    if name in OF_ALL:
         for script in (*methods.TRAINED, *methods.STRATEGIES):
-            rows += named(script, rows_of(results, script, GENERALIST))
+            rows += named(script, rows_of(results, script, OF_ALL[name]))
         rows = [row for row in rows if not any(flag in row[0] for flag in NOT_COMPARED)]
     elif name == "heuristics":
         for script in methods.STRATEGIES:
             rows += named(script, rows_of(results, script))
     else:
         rows = rows_of(results, name)
-    if name in ("all", "heuristics"):
-        rows += plans(results)
+    if name in OF_ALL or name == "heuristics":
+        rows += plans(results, OF_ALL.get(name, GENERALIST))
     if not rows:
         return "No runs yet.\n"
-    what = "method" if name in ("all", "heuristics") else "flags"
+    what = "method" if name in OF_ALL or name == "heuristics" else "flags"
     return HEADING.format(what=what) + "".join(line(*row) for row in rows)
 
 
-TABLES = {"distances": distances, "single_sites": sites_alone, "outside": other_libraries}
+OF_ALL = {"all": GENERALIST, "balanced": BALANCED}
+TABLES = {
+    "distances": distances,
+    "single_sites": sites_alone,
+    "six_rows": main_points.six_rows,
+    "in_words": main_points.in_words,
+    "outside": other_libraries,
+}
 EXCERPTS = {
     "speed": excerpts.speed,
     "shares": excerpts.shares,
@@ -209,6 +219,8 @@ EXCERPTS = {
     "first_run": excerpts.first_run,
     "scaling": excerpts.scaling,
     "boreal_map": excerpts.boreal_map,
+    "times": excerpts.times,
+    "misses": excerpts.missing,
 }
 
 

@@ -1,5 +1,5 @@
-"""What README.md, docs/performance.md and docs/scaling.md show of the files of results/ and of docs/validation.md, as
-Markdown."""
+"""What README.md and pages of docs/ show of results/first_run.txt, readme.csv and benchmark.csv, of the files of
+scaling and maps, and of docs/validation.md, as Markdown."""
 
 import re
 from pathlib import Path
@@ -117,6 +117,21 @@ def first_run() -> str:
     return f"```text\n{text[text.index('SCORE') :].rstrip()}\n```\n"
 
 
+def times() -> str:
+    """How long the README's commands took when it was followed last."""
+    path = paths.results() / "readme.csv"
+    if not path.exists():
+        return "*Not timed yet: `python analysis/follow_readme.py` does what stands above, and times it.*\n"
+    table = pd.read_csv(path)
+    steps = ", ".join(f"`{row.command}` {duration(row.seconds)}" for row in table.itertuples())
+    return f"*On {table.machine[0]}: {steps}.*\n"
+
+
+def duration(seconds: float) -> str:
+    """Seconds, or minutes from two on."""
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
+
+
 def cells(line: str) -> list[str]:
     """Of a row of a Markdown table."""
     return [cell.strip() for cell in line.strip("|\n").split("|")]
@@ -142,3 +157,12 @@ def towers() -> str:
     header = ["monthly means", *(f"{tower}: {name.split()[-1]}" for tower in TOWERS for name in SCORES)]
     table = markdown(header, [[name, *first[name], *second[name]] for name in first])
     return f"{table}\n{misses(page)} values of that page miss, and are listed at its end.\n"
+
+
+def missing() -> str:
+    """The README's line on what misses."""
+    count = misses(VALIDATION.read_text(encoding="utf-8"))
+    return (
+        f"- Against towers, field experiments and observed ranges {count} values miss, listed at the end of "
+        "[docs/validation.md](docs/validation.md).\n"
+    )

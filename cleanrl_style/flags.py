@@ -11,11 +11,12 @@ import io
 import os
 import sys
 
+#: Environments that a training may have, at most.
 MAX_ENVS = 1000
-# Training resets environments with seeds below this one, evaluation from this one on.
+#: Training resets environments with seeds below this one, evaluation from this one on.
 FIRST_EVALUATION_SEED = 1_000_000_000
 
-# Closed interval of each argument that has one.
+#: Closed interval of each argument that has one.
 LIMITS = {
     "seed": (0, FIRST_EVALUATION_SEED // MAX_ENVS - 1),
     "site_seed": (0, 2**63 - 1),

@@ -54,7 +54,9 @@ def _read(table: str) -> dict[str, Parameter]:
     return parameters
 
 
+#: Parameters of a site, by name: the rows of `site_parameters.csv`.
 SITE_PARAMETERS = _read("site_parameters.csv")
+#: Literature constants, by name: the rows of `constants.csv`.
 CONSTANTS = _read("constants.csv")
 
 #: Names of the site parameters that are observed, in the order of the table.

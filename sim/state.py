@@ -267,6 +267,7 @@ deadwood_before gpp_understorey mean_deficit photons ready_conifer ready_deciduo
 
 PARAMETER_NAMES = (*SITE_PARAMETERS, *CONSTANTS, *MECHANISMS, "weather_as_observed", *WITHOUT_SCENARIO)
 STATE_NAMES = tuple(STATE)
+#: Columns of the annual record, in order.
 RECORD_NAMES = tuple(RECORD)
 DAILY_NAMES = tuple(DAILY)
 STATE_SIZE = len(STATE) + 2 * AGES

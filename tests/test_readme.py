@@ -8,14 +8,16 @@ from scripts import ROOT
 from analysis import excerpts
 from analysis.document_results import EXCERPTS, SECTION
 
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README, START, RESULTS = (
+    (ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/start.md", "docs/results.md")
+)
 VALIDATION = (ROOT / excerpts.VALIDATION).read_text(encoding="utf-8")
-PYTHON = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+PYTHON = re.findall(r"```python\n(.*?)```", README + START, re.DOTALL)
 
 
 @pytest.mark.parametrize("number", range(len(PYTHON)))
 def test_python_blocks_run(number):
-    exec(compile(PYTHON[number], f"README.md, Python block {number + 1}", "exec"), {})
+    exec(compile(PYTHON[number], f"README.md and docs/start.md, Python block {number + 1}", "exec"), {})
 
 
 def test_there_are_python_blocks():
@@ -24,7 +26,7 @@ def test_there_are_python_blocks():
 
 def test_commands_and_links_name_files_that_exist():
     named = set(re.findall(r"python ([\w/]+\.py)", README)) | set(re.findall(r"\]\(([\w/.-]+)\)", README))
-    assert len(named) > 20
+    assert len(named) > 12
     assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
 
 
@@ -32,8 +34,22 @@ def test_commands_and_links_name_files_that_exist():
 def test_excerpts_are_of_what_was_measured_last(name, monkeypatch):
     monkeypatch.chdir(ROOT)
     pages = [(ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("performance.md", "scaling.md")]
-    shown = [match[0] for match in SECTION.finditer(README + "".join(pages)) if match[2] == name]
-    assert shown == [f"<!-- results of {name} -->\n{EXCERPTS[name]()}<!-- end of results -->"]
+    shown = {match[0] for match in SECTION.finditer(README + START + RESULTS + "".join(pages)) if match[2] == name}
+    assert shown == {f"<!-- results of {name} -->\n{EXCERPTS[name]()}<!-- end of results -->"}
+
+
+def test_the_readme_is_a_screen_and_a_half():
+    assert len(README.splitlines()) <= 125  # of which 40 are made by commands
+
+
+def test_times_are_shown_in_minutes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "Not timed yet" in excerpts.times()
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "readme.csv").write_text(
+        "command,seconds,machine\npytest,330,2 cores of X\npip,61,2 cores of X\n"
+    )
+    assert excerpts.times() == "*On 2 cores of X: `pytest` 6 min, `pip` 61 s.*\n"
 
 
 def test_excerpts_read_the_pages():
@@ -67,7 +83,7 @@ def missing(what):
     return [tuple(map(float, found)) for found in re.findall(listed, VALIDATION.split("What misses\n")[1])]
 
 
-def test_the_readmes_words_on_what_misses_are_so():
+def test_the_words_on_what_misses_are_so():
     clear_cut = missing("ground heat, May to August")
     assert clear_cut and all(median <= 0.34 * (low * high) ** 0.5 for median, low, high in clear_cut)  # the limits are
     # half and twice the measured

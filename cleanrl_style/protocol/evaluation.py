@@ -16,6 +16,7 @@ from cleanrl_style.protocol.task import Task, as_option, final_info
 from sim.block import lanes_for
 from sim.stands import available_cores
 
+#: What is evaluated of an agent: its most probable action, and one drawn from its probabilities.
 POLICIES = ("greedy", "sampled")
 # The policy that results are about: one acts by it, and no exploration is left in it (docs/decisions.md, 64).
 PRIMARY = "greedy"

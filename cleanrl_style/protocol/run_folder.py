@@ -38,6 +38,7 @@ try:
 except ImportError:  # Windows, where a folder is not locked
     fcntl = None
 
+#: Columns of timing.csv.
 TIMING_COLUMNS = ("phase", "global_step", "seconds", "elapsed_seconds")
 # What a run makes, but for config.json and timing.csv. The first of them makes it a finished run.
 RESULTS = (
@@ -52,6 +53,7 @@ RESULTS = (
 )
 # Steps between checkpoints, at least: counted in steps, since by the clock the last one would differ each time.
 CHECKPOINT_STEPS = 2048
+#: How numbers are written into a run's tables.
 FLOAT_FORMAT = "%.9g"
 LONGEST_NAME = 200  # bytes of a folder's name; file systems allow 255
 

@@ -26,10 +26,12 @@ from sim.task.observation import Moment, Table, observation_rows
 from sim.task.preference import check_weights, draw_weights, shown
 from sim.task.timber import TIMBER_COLUMNS, Timber, check_discount_rate, countries
 
+#: A new site each episode, whose parameters are observed; or a fixed one.
 MODES = ("generalist", "site-specific")
 
 #: The world of `boreal-balanced-v0`, as arguments of an environment or of `sim.Stands`.
 BALANCED_WORLD = {"boundary": "balanced", "soil_carbon": "balanced", "weather": "observed"}
+#: Length of an episode.
 DEFAULT_YEARS = 50
 
 

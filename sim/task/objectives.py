@@ -12,6 +12,7 @@ from sim.parameters import check_name
 from sim.task.biodiversity import biodiversity_reward
 from sim.task.timber import timber_reward
 
+#: What the thaw reward counts, see `boreal_env.thaw_reward`; the paper's is the first.
 THAW_FORMULATIONS = ("asymmetric", "contrast", "raw_degree_days")
 COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
 
@@ -164,6 +165,7 @@ def rewards_of_year(record: np.ndarray, actions: np.ndarray, reward: Reward, for
 
 #: Columns of the annual record with the rewards.
 HISTORY_NAMES = (*sim.RECORD_NAMES, *REWARD_COLUMNS)
+#: Objectives of the paper, in the order of its reward vector.
 PAPER_OBJECTIVES = ("carbon", "thaw")
 
 

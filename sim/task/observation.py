@@ -219,8 +219,11 @@ def observation_rows(objectives: Sequence[str]) -> tuple[Observed, ...]:
     return (*(Observed(name, "preference", "1", 0, 1, 0, 1, weight(k)) for k, name in enumerate(names)), *ROWS)
 
 
+#: The observation of the paper's two objectives, an `Observed` for each entry.
 OBSERVATION = observation_rows(PAPER_OBJECTIVES)
+#: Names of its entries, in order.
 OBSERVATION_NAMES = tuple(row.name for row in OBSERVATION)
+#: Groups of its entries, in order: what `observation_groups` of an environment keeps.
 OBSERVATION_GROUPS = tuple(dict.fromkeys(row.group for row in OBSERVATION))
 
 

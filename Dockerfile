@@ -1,0 +1,16 @@
+# The README's two commands, in a container.
+#
+#     docker build -t borearl .
+#     docker run --rm -v "$PWD/runs:/borearl/runs" borearl             # train, evaluate, score
+#     docker run --rm borearl pytest                                   # all tests
+FROM python:3.11-slim
+
+WORKDIR /borearl
+COPY . .
+# torch without CUDA: a tenth of the download
+RUN pip install --no-cache-dir --extra-index-url https://download.pytorch.org/whl/cpu -c constraints.txt -e ".[train,test]"
+# every kernel, so that a container does not compile them again
+ENV NUMBA_CACHE_DIR=/borearl/.cache
+RUN python -c "from cleanrl_style import protocol; from sim.block import KERNELS; protocol.compile_physics(KERNELS)"
+
+CMD ["python", "cleanrl_style/ppo_curriculum.py", "--seed", "1", "--vectorization", "lockstep"]

@@ -1,0 +1,98 @@
+"""What README.md and docs/results.md say first: six rows of the main table, and what all its rows say, in words."""
+
+import textwrap
+
+import numpy as np
+
+from analysis import methods
+from analysis.experiments import BALANCED, GENERALIST
+from analysis.tables import main_results
+
+WORLDS = (BALANCED, GENERALIST)
+BEST_PLAN = "best_constant_mix"
+PLANTING = "plus_100"
+SIX = (PLANTING, "eupg_var_lambda", "ppo_gated", "ppo_curriculum", "ppo_group")
+"""Rows of the README, between doing nothing, which is 0, and the best constant plans."""
+
+
+def default_rows(results, env_id: str) -> dict[str, list]:
+    """Script -> its runs in an environment as its defaults are, of those that have runs."""
+    return {
+        script: replicates
+        for (script, its_env, setting), replicates in results.rows_of_two_objectives().items()
+        if its_env == env_id and replicates and setting in ("default", "vectorization=lockstep")
+    }
+
+
+def best_plan(results, env_id: str) -> list:
+    """The best constant plan of each weight, as `default_rows` has its rows; empty if its study is not there."""
+    return main_results.constant_plans(results)[BEST_PLAN, env_id, "default"]
+
+
+def shown(scores: dict) -> str:
+    """The greedy score with its interval; empty where it is not known."""
+    value, low, high = (scores.get(f"score_greedy{part}", np.nan) for part in ("", "_low", "_high"))
+    if np.isnan(value):
+        return ""
+    return f"{value:.0f}" + ("" if np.isnan(low) or low == high else f" [{low:.0f}, {high:.0f}]")
+
+
+def six_rows(results) -> str:
+    """Scores of the best constant plans, of planting and of four trained methods, in both worlds."""
+    rows = {env_id: default_rows(results, env_id) for env_id in WORLDS}
+    text = "| method | training seeds | " + " | ".join(f"`{env_id}`" for env_id in WORLDS) + " |\n" + "|---" * 4 + "|\n"
+    plans = [shown(main_results.scores(best_plan(results, env_id))) for env_id in WORLDS]
+    text += f"| the best constant plan of each preference | | {' | '.join(plans)} |\n"
+    for script in SIX:
+        of_worlds = [rows[env_id].get(script, []) for env_id in WORLDS]
+        seeds = " and ".join(dict.fromkeys(str(len(replicates)) for replicates in of_worlds if replicates))
+        what = (seeds if script in methods.TRAINED else "") if seeds else "not run yet"
+        cells = [shown(main_results.scores(replicates)) if replicates else "" for replicates in of_worlds]
+        text += f"| {methods.title(script)} | {what} | {' | '.join(cells)} |\n"
+    return text
+
+
+def in_words(results) -> str:
+    """A paragraph for each world: who is ahead, and whether the preference is followed."""
+    paragraphs = [paragraph(results, env_id) for env_id in WORLDS]
+    return "".join(paragraphs) or "No runs yet.\n"
+
+
+def paragraph(results, env_id: str) -> str:
+    """What the main table says of one world; empty without trained methods or constant plans."""
+    rows = default_rows(results, env_id)
+    scores = {script: main_results.scores(replicates) for script, replicates in rows.items()}
+    known = {script: its["score_greedy"] for script, its in scores.items() if not np.isnan(its["score_greedy"])}
+    trained = [script for script in known if script in methods.TRAINED]
+    if not trained or PLANTING not in known:
+        return ""
+    best = max(trained, key=known.__getitem__)
+    above = [script for script in trained if known[script] > known[PLANTING]]
+    beat = [script for script in trained if known[script] > 100.0]
+    text = (
+        f"- **`{env_id}`.** Planting 100 stems a year without looking scores {known[PLANTING]:.0f}. The best of "
+        f"{len(trained)} trained methods is {methods.title(best)} with {shown(scores[best])}; "
+        f"{named(above)} above planting, {named(beat)} above 100."
+    )
+    followed = {
+        script: main_results.row_of_runs((script, env_id, "default"), rows[script])
+        for script in trained
+        if script in methods.LEARNERS
+    }
+    carbon = [script for script, row in followed.items() if row["carbon_change_low"] > 0.0]
+    thaw = [script for script, row in followed.items() if row["thaw_change_high"] < 0.0]
+    text += (
+        f" Asked for carbon instead of thaw, {named(carbon, 'store')} more carbon for it; asked for thaw instead of "
+        f"carbon, {named(thaw, 'keep')} more cold in the ground (intervals over training seeds without 0)."
+    )
+    return textwrap.fill(text, 120, subsequent_indent="  ", break_on_hyphens=False) + "\n"
+
+
+def named(scripts: list[str], verb: str = "") -> str:
+    """Titles of scripts as the subject of a sentence."""
+    if not scripts:
+        return "none " + (f"{verb}s" if verb else "is")
+    titles = [methods.title(script) for script in scripts]
+    words = titles[0] if len(titles) == 1 else ", ".join(titles[:-1]) + f" and {titles[-1]}"
+    plural = len(titles) > 1
+    return f"{words} " + ((verb if plural else f"{verb}s") if verb else ("are" if plural else "is"))
