@@ -26,7 +26,7 @@ from analysis.exploring.stands import YEARS, Stand
 from cleanrl_style import protocol
 
 TITLE = "Two stands, one weather"
-POLICIES = {"A": "Keep 1000 stems/ha, plant conifers", "B": "Plant 100 a year, half conifers"}
+PLANTED_CONIFERS = {"A": 1.0, "B": 0.0}  # at first, of a hundred a year
 PLAY_MS = 400  # a year that is watched
 INTRODUCTION = (
     "Manage a boreal forest for fifty years: store carbon in trees, and keep the frozen ground below them cold. Stands "
@@ -72,7 +72,7 @@ class Page:
         self.message = pn.pane.HTML(visible=False)
         self.site = SiteControls(self.restart)
         found = trained_runs(runs)
-        self.cards = {name: StandCard(name, policy, found, self.replay) for name, policy in POLICIES.items()}
+        self.cards = {name: StandCard(name, mix, found, self.replay) for name, mix in PLANTED_CONIFERS.items()}
         self.alone: Stand | None = None
 
         def button(name: str, method, primary: bool = False) -> pn.widgets.Button:
@@ -228,8 +228,8 @@ class Page:
             return pn.FlexBox(*(pn.Column(pn.pane.Bokeh(chart.figure), styles=style.CHART) for chart in lines.values()))
 
         stands = pn.Column(
-            pn.Column(bar, styles={**style.CARD, "position": "sticky", "top": "6px", "z-index": "20"}),
-            pn.FlexBox(*(card.layout() for card in self.cards.values()), gap="14px"),
+            pn.Column(bar, styles=style.CARD, stylesheets=[style.STAYS]),
+            pn.FlexBox(*(card.layout() for card in self.cards.values()), gap="14px", align_items="stretch"),
             pn.Column(
                 pn.pane.HTML(
                     style.lines({**{f"stand {name}": colour for name, colour in COLOURS.items()}, ALONE: ALONE_COLOUR})
@@ -244,9 +244,11 @@ class Page:
             styles={"flex": "999 1 620px", "gap": "14px"},
         )
         site = pn.Column(
-            pn.pane.HTML(style.heading("Site")), self.site.layout(), styles={**style.CARD, "flex": "1 1 270px"}
+            pn.pane.HTML(style.heading("Site")),
+            self.site.layout(),
+            styles={**style.CARD, "flex": "1 1 290px"},
+            stylesheets=[style.LAST],
         )
-        site.stylesheets = ["@media (max-width: 950px) { :host { order: 2; } }"]
         self.body.objects = [pn.FlexBox(site, stands, gap="14px", align_items="flex-start")]
         return pn.Column(
             pn.pane.HTML(style.introduction(TITLE, INTRODUCTION)),
@@ -270,6 +272,8 @@ def main(port: int = 5006, show: bool = True, runs: Path = Path("runs")) -> None
         show: open it in a browser
         runs: folder of runs, whose trained policies can be chosen
     """
+
+    pn.extension(sizing_mode="stretch_width", raw_css=[style.BODY])
 
     def page():
         made = Page(runs)

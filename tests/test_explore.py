@@ -164,13 +164,15 @@ def page(tmp_path):
 
 
 def test_years_are_played_and_shown(page):
+    from analysis.exploring.stand_card import signed
+
     a, b = page.cards.values()
     page.forward(3)
     assert [stand.played for stand in page.stands.values()] == [3, 3, 3] and page.year.value == 3
     assert a.stand.actions != b.stand.actions and page.stands["left alone"].actions == [boreal_env.NO_CHANGE] * 3
     assert a.picture.object.startswith(b"\x89PNG") and a.picture.object != b.picture.object
     gain = b.stand.weights @ (b.stand.returns - page.alone.returns)
-    assert f"<td>{gain:+.2f}</td></tr></table>" in b.numbers.object
+    assert f"<td>{signed(gain)}</td></tr></table>" in b.numbers.object
     lines = page.returns["Weighted gain"].source.data
     assert lines["x"].tolist() == [0, 1, 2, 3] and lines["B"][-1] == pytest.approx(gain)
     assert not lines["left alone"].any()
@@ -202,8 +204,11 @@ def test_my_own_hand_goes_on_from_what_was_done(page):
     card = page.cards["B"]
     page.forward(2)
     before = card.stand.actions
-    card.policy.value = "I do, year by year"
-    card.change.value, card.mix.value = 50.0, 0.25
+    card.policy.value = "You, year by year"
+    card.change.value, card.mix.value = -100.0, 0.25
+    assert card.hint.visible == (not card.stand.masks[1])
+    card.change.value = 50.0
+    assert not card.hint.visible
     page.forward(1)
     card.change.value = 0.0
     page.forward(1)
@@ -253,7 +258,7 @@ def test_the_page_in_a_browser(tmp_path):
         tab.locator("tr.sum").first.get_by_text("+0.00").wait_for()
 
         tab.get_by_label("Who manages it").nth(1).select_option("The policy of a run's folder")
-        folder = tab.get_by_label("Folder of the run")
+        folder = tab.get_by_label("Folder of the run").nth(1)
         folder.fill("runs/nowhere")
         folder.press("Enter")
         tab.get_by_text("runs/nowhere has no config.json").wait_for()

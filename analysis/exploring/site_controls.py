@@ -19,7 +19,7 @@ from analysis.exploring.stands import (
 from sim.physical_constants import FREEZING_POINT_K
 from sim.spin_up import BOUNDARY
 
-EVALUATION = "An evaluation site, by number"
+EVALUATION = "Evaluation site"
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class Scale:
 
 
 SCALES = {
-    "latitude_deg": Scale("Latitude (°N); the temperature goes with it", 50.0, 70.0, 0.5),
+    "latitude_deg": Scale("Latitude (°N), with its temperature", 50.0, 70.0, 0.5),
     "mean_annual_temperature_c": Scale("Mean air temperature (°C)", -15.0, 5.0, 0.1),
     "seasonal_amplitude_c": Scale("Summer above that mean (°C)", 10.0, 30.0, 0.5),
-    "winter_snow_mm_day": Scale("Snow, on a day that it falls (mm of water)", 0.0, 12.0, 0.5),
-    "summer_rain_mm_day": Scale("Rain, on a wet summer day (mm)", 2.0, 30.0, 1.0),
+    "winter_snow_mm_day": Scale("Snow on a snowy day (mm water)", 0.0, 12.0, 0.5),
+    "summer_rain_mm_day": Scale("Rain on a wet summer day (mm)", 2.0, 30.0, 1.0),
     "wind_speed_m_s": Scale("Wind (m/s)", 0.5, 8.0, 0.1),
-    BOUNDARY: Scale("Ground 12 m down, fixed (°C)", -8.0, 6.0, 0.1, FREEZING_POINT_K),
+    BOUNDARY: Scale("Ground 12 m down (°C)", -8.0, 6.0, 0.1, FREEZING_POINT_K),
 }
 
 
@@ -56,7 +56,9 @@ class SiteControls:
         )
         self.seed = pn.widgets.IntInput(name="Seed of first stand, weather and dice", value=0, start=0, end=2**31 - 1)
         self.sliders = {
-            parameter: pn.widgets.FloatSlider(name=scale.name, start=scale.low, end=scale.high, step=scale.step)
+            parameter: pn.widgets.FloatSlider(
+                name=scale.name, start=scale.low, end=scale.high, step=scale.step, format="0.0"
+            )
             for parameter, scale in SCALES.items()
         }
         self.filling = False  # whether values are set here, not by the user

@@ -11,12 +11,14 @@ from analysis.exploring.stands import YEARS, Setting, Stand
 from sim.management import CONIFER_MIXES, DENSITY_CHANGES
 from sim.task.picture import View
 
-CONSTANT, BY_HAND, OTHER_RUN = "One action, every year", "I do, year by year", "The policy of a run's folder"
+CONSTANT, BY_HAND, OTHER_RUN = "One action, every year", "You, year by year", "The policy of a run's folder"
 CHANGES = {
     f"{'plant' if change > 0 else 'cut'} {abs(change):.0f} stems/ha" if change else "neither plant nor cut": change
     for change in reversed(DENSITY_CHANGES)
 }
 MIXES = {f"{100 * mix:.0f} % conifers": mix for mix in CONIFER_MIXES}
+HINT = "Only a part of that can be done now, and that costs a penalty."
+PENALTIES = ("biomass_limit_penalty", "soil_limit_penalty", "density_penalty", "ineffective_penalty")
 LEGEND = {**SPECIES, **{name: colour for name, (_, colour) in STOCKS.items()}}
 GREEDY = {"most likely action": True, "action by chance": False}
 
@@ -24,15 +26,16 @@ GREEDY = {"most likely action": True, "action by chance": False}
 class StandCard:
     """Controls and picture of a stand; `changed` is called with the card when somebody else manages the stand."""
 
-    def __init__(self, letter: str, policy: str, runs: list[str], changed: Callable[["StandCard"], None]):
+    def __init__(self, letter: str, conifers: float, runs: list[str], changed: Callable[["StandCard"], None]):
+        """conifers : share of them among the trees that are planted every year, to begin with."""
         self.letter, self.runs = letter, runs
         self.stand: Stand | None = None
         self.player: Player | None = None
         self.policy = pn.widgets.Select(
-            name="Who manages it", options=[*STRATEGIES, CONSTANT, BY_HAND, *runs, OTHER_RUN], value=policy
+            name="Who manages it", options=[CONSTANT, BY_HAND, *STRATEGIES, *runs, OTHER_RUN]
         )
         self.change = pn.widgets.Select(name="Each year", options=CHANGES)
-        self.mix = pn.widgets.Select(name="of which", options=MIXES, value=1.0)
+        self.mix = pn.widgets.Select(name="of which", options=MIXES, value=conifers)
         self.folder = pn.widgets.TextInput(
             name="Folder of the run", placeholder="runs/ppo_curriculum/boreal-generalist-v0/seed1"
         )
@@ -40,11 +43,12 @@ class StandCard:
         self.preference = pn.widgets.FloatSlider(
             name="Preference: weight of carbon (the rest is thaw's)", start=0.0, end=1.0, step=0.05, value=0.5
         )
+        self.hint = pn.pane.HTML(HINT, margin=(0, 10), visible=False)
         self.picture = pn.pane.PNG(sizing_mode="scale_width", margin=0)
         self.numbers = pn.pane.HTML(stylesheets=[style.NUMBERS])
         self.ages, self.stocks = AgeBars(), StockAreas()
         for widget in (self.policy, self.change, self.mix, self.folder, self.greedy):
-            widget.param.watch(lambda event: self.take(event, changed), "value")
+            widget.param.watch(lambda _: self.take(changed), "value")
         self.preference.param.watch(lambda _: changed(self), "value_throttled")
         self.show_controls()
 
@@ -59,6 +63,7 @@ class StandCard:
             pn.pane.HTML(style.heading(f"Stand {self.letter}", COLOURS[self.letter]), margin=(0, 10)),
             self.policy,
             pn.Row(self.change, self.mix),
+            self.hint,
             self.folder,
             self.greedy,
             self.preference,
@@ -76,8 +81,9 @@ class StandCard:
         self.change.name = "This year" if self.by_hand else "Each year, where it can be done"
         self.folder.visible = chosen == OTHER_RUN
         self.greedy.visible = chosen in (*self.runs, OTHER_RUN)
+        self.hint.visible = self.by_hand and self.stand is not None and not self.stand.masks[self.action]
 
-    def take(self, event, changed) -> None:
+    def take(self, changed) -> None:
         """Somebody else manages the stand, or otherwise. By hand it begins with what was done before."""
         self.show_controls()
         waits_for_folder = self.policy.value == OTHER_RUN and not self.folder.value
@@ -119,6 +125,7 @@ class StandCard:
 
     def show(self, alone: Stand, tops: tuple[float, float]) -> None:
         """Picture and numbers of the year looked at; tops : of the axes, the same for both stands."""
+        self.show_controls()
         view = self.stand.view()
         self.picture.object = drawing(view)
         self.numbers.object = numbers(self.stand, alone) + events(view) + style.squares(LEGEND)
@@ -130,13 +137,18 @@ def numbers(stand: Stand, alone: Stand) -> str:
     """Both returns and the weighted sum, beside what they are above those of the stand left alone."""
     gains = stand.returns - alone.returns
     rows = [
-        f"<tr><td>{name}, weight {weight:.2f}</td><td>{total:+.2f}</td><td>{gain:+.2f}</td></tr>"
+        f"<tr><td>{name}, weight {weight:.2f}</td><td>{signed(total)}</td><td>{signed(gain)}</td></tr>"
         for name, weight, total, gain in zip(("Carbon", "Thaw"), stand.weights, stand.returns, gains, strict=True)
     ]
     head = f"<tr><th>After {stand.year} of {YEARS} years</th><th>return</th><th>gain</th></tr>"
     total, gain = stand.weights @ stand.returns, stand.weights @ gains
-    last = f"<tr class=sum><td>Weighted sum</td><td>{total:+.2f}</td><td>{gain:+.2f}</td></tr>"
+    last = f"<tr class=sum><td>Weighted sum</td><td>{signed(total)}</td><td>{signed(gain)}</td></tr>"
     return f"<table>{head}{''.join(rows)}{last}</table>"
+
+
+def signed(number: float) -> str:
+    """With its sign, to two places."""
+    return f"{number:+.2f}".replace("-", "−")
 
 
 def events(view: View) -> str:
@@ -150,4 +162,6 @@ def events(view: View) -> str:
     ]
     killed = {name: 100 * view.last(f"{name}_mortality") for name in ("fire", "insect")}
     said += [f"{name}{'s' * (name == 'insect')} killed {share:.0f} %" for name, share in killed.items() if share > 0.0]
+    penalty = sum(view.last(name) for name in PENALTIES)
+    said += [f"penalty {signed(-penalty)} carbon"] * (penalty > 0.0)
     return f"<p>{' · '.join(said)}</p>"

@@ -20,9 +20,9 @@ YEARS = boreal_env.DEFAULT_YEARS
 #: What the page calls a world -> its environment. In the paper's alone the ground far below is chosen with the site.
 PAPER = "boreal-generalist-v0"
 WORLDS = {
-    "Ground in balance with the climate": "boreal-balanced-v0",
-    "The same, warming from 2025 on (SSP2-4.5)": "boreal-warming-v0",
-    "The paper's: ground drawn apart": PAPER,
+    "Ground in balance with climate": "boreal-balanced-v0",
+    "The same, then warming (SSP2-4.5)": "boreal-warming-v0",
+    "The paper's, ground chosen apart": PAPER,
 }
 
 #: What a place has of its own; all else is from the middle of the ranges that sites are sampled from.

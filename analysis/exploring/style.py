@@ -4,11 +4,16 @@ import html
 
 INK, QUIET, RULE = "#22303c", "#5b6873", "#d5dbe0"
 
+BODY = "body { background: #f1f4f5; }"
 PAGE = {"font-family": "system-ui, sans-serif", "margin": "0 auto", "padding": "12px", "gap": "12px"}
 CARD = {"background": "white", "border-radius": "10px", "padding": "12px 14px", "box-shadow": "0 1px 4px #0002"}
 CHART = {"flex": "1 1 260px"}
-SAID = {"background": "#e5eff7", "color": "#0b4a75", "padding": "8px 14px", "border-radius": "8px", "font-size": "14px"}
+MESSAGE = {"padding": "8px 14px", "border-radius": "8px", "font-size": "14px", "position": "sticky", "z-index": "30"}
+SAID = {**MESSAGE, "background": "#e5eff7", "color": "#0b4a75", "top": "6px"}
 WRONG = {**SAID, "background": "#fde8e4", "color": "#8f1d06"}
+WIDE, NARROW = "@media (min-width: 951px)", "@media (max-width: 950px)"
+STAYS = f"{WIDE} {{ :host {{ position: sticky; top: 6px; z-index: 20; }} }}"  # in sight
+LAST = f"{NARROW} {{ :host {{ order: 2; }} }}"  # below all else
 
 #: Of the table of returns, what happened, and the colours below it.
 NUMBERS = f"""
