@@ -77,7 +77,7 @@ class Page:
 
         def button(name: str, method, primary: bool = False) -> pn.widgets.Button:
             kind = "primary" if primary else "default"
-            made = pn.widgets.Button(name=name, button_type=kind, width=96, height=32, sizing_mode="fixed", margin=4)
+            made = pn.widgets.Button(label=name, color=kind, width=96, height=32, sizing_mode="fixed", margin=4)
             made.on_click(lambda _: method())
             return made
 
@@ -88,7 +88,7 @@ class Page:
             "To the end": button("To the end", lambda: self.forward(YEARS)),
             "Play": button("Play", self.play_or_pause),
         }
-        self.year = pn.widgets.IntSlider(name="Year", start=0, end=YEARS, value=0, margin=(0, 16))
+        self.year = pn.widgets.IntSlider(label="Year", start=0, end=YEARS, value=0, margin=(0, 16))
         self.year.param.watch(lambda event: event.new == self.alone.year or self.look(event.new), "value_throttled")
         self.returns = {title: Lines(title) for title in OF_RETURNS}
         self.record = {title: Lines(title, first=1) for title in OF_RECORD}
@@ -171,7 +171,7 @@ class Page:
             if self.alone.year == YEARS:
                 self.look(0)
             self.clock = pn.state.add_periodic_callback(self.tick, period=PLAY_MS)
-            self.buttons["Play"].name = "Pause"
+            self.buttons["Play"].label = "Pause"
 
     def tick(self) -> None:
         """A year of those that are watched."""
@@ -184,7 +184,7 @@ class Page:
         if self.clock:
             self.clock.stop()
             self.clock = None
-            self.buttons["Play"].name = "Play"
+            self.buttons["Play"].label = "Play"
 
     # -----------------------------------------------------------------------------------------------------------
     # What is shown

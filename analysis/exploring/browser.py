@@ -57,8 +57,9 @@ def opened(address: str, width: int, height: int):
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program(), args=FLAGS)
         tab = browser.new_page(viewport={"width": width, "height": height})
+        tab.set_default_timeout(PATIENCE_MS)
         tab.goto(address)
-        tab.get_by_text("After 0 of").first.wait_for(timeout=PATIENCE_MS)
+        tab.get_by_text("After 0 of").first.wait_for()
         yield tab
         browser.close()
 

@@ -49,15 +49,15 @@ class SiteControls:
 
     def __init__(self, changed: Callable[[], None]):
         self.changed = changed
-        self.world = pn.widgets.Select(name="World", options=WORLDS)
-        self.place = pn.widgets.Select(name="Site", options=[EVALUATION, *PLACES])
+        self.world = pn.widgets.Select(label="World", options=WORLDS)
+        self.place = pn.widgets.Select(label="Site", options=[EVALUATION, *PLACES])
         self.number = pn.widgets.IntInput(
-            name="Number of the evaluation site", value=1, start=1, end=len(evaluation_sites())
+            label="Number of the evaluation site", value=1, start=1, end=len(evaluation_sites())
         )
-        self.seed = pn.widgets.IntInput(name="Seed of first stand, weather and dice", value=0, start=0, end=2**31 - 1)
+        self.seed = pn.widgets.IntInput(label="Seed of first stand, weather and dice", value=0, start=0, end=2**31 - 1)
         self.sliders = {
             parameter: pn.widgets.FloatSlider(
-                name=scale.name, start=scale.low, end=scale.high, step=scale.step, format="0.0"
+                label=scale.name, start=scale.low, end=scale.high, step=scale.step, format="0.0"
             )
             for parameter, scale in SCALES.items()
         }

@@ -32,16 +32,16 @@ class StandCard:
         self.stand: Stand | None = None
         self.player: Player | None = None
         self.policy = pn.widgets.Select(
-            name="Who manages it", options=[CONSTANT, BY_HAND, *STRATEGIES, *runs, OTHER_RUN]
+            label="Who manages it", options=[CONSTANT, BY_HAND, *STRATEGIES, *runs, OTHER_RUN]
         )
-        self.change = pn.widgets.Select(name="Each year", options=CHANGES)
-        self.mix = pn.widgets.Select(name="of which", options=MIXES, value=conifers)
+        self.change = pn.widgets.Select(label="Each year", options=CHANGES)
+        self.mix = pn.widgets.Select(label="of which", options=MIXES, value=conifers)
         self.folder = pn.widgets.TextInput(
-            name="Folder of the run", placeholder="runs/ppo_curriculum/boreal-generalist-v0/seed1"
+            label="Folder of the run", placeholder="runs/ppo_curriculum/boreal-generalist-v0/seed1"
         )
         self.greedy = pn.widgets.RadioButtonGroup(options=GREEDY, margin=(5, 10))
         self.preference = pn.widgets.FloatSlider(
-            name="Preference: weight of carbon (the rest is thaw's)", start=0.0, end=1.0, step=0.05, value=0.5
+            label="Preference: weight of carbon (the rest is thaw's)", start=0.0, end=1.0, step=0.05, value=0.5
         )
         self.hint = pn.pane.HTML(HINT, margin=(0, 10), visible=False)
         self.picture = pn.pane.PNG(sizing_mode="scale_width", margin=0)
@@ -78,7 +78,7 @@ class StandCard:
         """Only those that matter to who manages the stand."""
         chosen = self.policy.value
         self.change.visible = self.mix.visible = chosen in (CONSTANT, BY_HAND)
-        self.change.name = "This year" if self.by_hand else "Each year, where it can be done"
+        self.change.label = "This year" if self.by_hand else "Each year, where it can be done"
         self.folder.visible = chosen == OTHER_RUN
         self.greedy.visible = chosen in (*self.runs, OTHER_RUN)
         self.hint.visible = self.by_hand and self.stand is not None and not self.stand.masks[self.action]

@@ -29,8 +29,8 @@ WORLDS = {
 CLIMATE = ("latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c", BOUNDARY)
 PLACES = {
     "Middle of all ranges": {},
-    "Svartberget, Sweden (no permafrost)": {name: SE_SVB.site[name] for name in CLIMATE},
-    "Poker Flat, Alaska (permafrost)": {name: US_PRR.site[name] for name in CLIMATE},
+    "Svartberget, Sweden (64.3 °N)": {name: SE_SVB.site[name] for name in CLIMATE},
+    "Poker Flat, Alaska (65.1 °N)": {name: US_PRR.site[name] for name in CLIMATE},
 }
 PLACE_SEED = 1
 
