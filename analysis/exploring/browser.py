@@ -27,7 +27,7 @@ FLAGS = (
     "--disable-component-update --disable-sync"
 ).split()
 PATIENCE_MS = 120_000  # for a first start, which compiles
-COLOURS = 128
+COLOURS = 255
 
 
 def program() -> str | None:
@@ -78,8 +78,8 @@ def main(path: Path = Path("docs/images/explore.png"), width: int = 1280, height
     with served(Path.cwd()) as address, opened(address, width, height) as tab:
         for decade in range(10, years + 1, 10):
             tab.get_by_role("button", name="Ten years").click()
-            tab.get_by_text(f"After {decade} of").first.wait_for()
-        tab.wait_for_timeout(1000)  # charts are drawn after numbers
+            tab.get_by_text(f"Through year {decade},").wait_for()  # what is filled last
+        tab.wait_for_timeout(2000)  # charts are drawn after texts
         shot = Image.open(io.BytesIO(tab.screenshot()))
     with protocol.replacing(path) as file:
         shot.convert("RGB").quantize(COLOURS).save(file, format="png", optimize=True)
