@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 CONDITIONED = "conditioned on the preference"
 FIXED_WEIGHT = "trained for one weight"
+POPULATION = "a population, one of which is chosen for each weight"
 HEURISTIC = "fixed strategy of the paper"
 CONTROL = "fixed strategy of ours"
 
@@ -22,7 +23,7 @@ class Method:
     @property
     def trains(self) -> bool:
         """Whether it is trained."""
-        return self.kind in (CONDITIONED, FIXED_WEIGHT)
+        return self.kind in (CONDITIONED, FIXED_WEIGHT, POPULATION)
 
     @property
     def path(self) -> str:
@@ -42,6 +43,7 @@ ROWS = (
     Method("ppo_curriculum", "Curriculum PPO", CONDITIONED, "#D55E00", "o", "curriculum_ppo"),
     Method("ppo_group", "Group PPO", CONDITIONED, "#F0E442", "P"),
     Method("eupg_fixed_lambda", "Fixed λ EUPG", FIXED_WEIGHT, "#0072B2", "D", "fixed_weight_eupg"),
+    Method("moea", "NSGA-II", POPULATION, "#56B4E9", "X"),
 )
 METHODS = {method.script: method for method in ROWS}
 
