@@ -8,8 +8,9 @@ found, and plans that look at the stand may pass it. The search begins with the 
 the evaluation, the best plan so far is changed in a block or two, or takes a stretch of another weight's best.
 
 How far it has converged is part of the result: what the second half of the budget still gains at the weights. Leaves
-results/studies/best_plans/<environment>.csv, with which `analysis/generalisation.py` judges runs, and ships the plans of the
-fronts as sim/task/best_plans/<environment>.csv.gz, which `env.unwrapped.pareto_front(gamma)` plays.
+results/studies/best_plans/<environment>.csv, by which `analysis/generalisation.py` and the table `best_known` judge
+runs, and ships the plans of the fronts as sim/task/best_plans/<environment>.csv.gz, which
+`env.unwrapped.pareto_front(gamma)` plays.
 """
 
 import contextlib

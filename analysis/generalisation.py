@@ -66,7 +66,10 @@ def scaled(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def ratios_of_site(points: np.ndarray, best: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, float]:
-    """NHGR and EUGR of a policy's points (n, m) against the site's best known front (k, m)."""
+    """NHGR and EUGR of a policy's points (n, m) against the site's best known front (k, m).
+
+    NaN where that front dominates nothing: it has two ends alone, and no policy does worse than each in any objective.
+    """
     ours, known = scaled(points, low, high), scaled(best, low, high)
     volumes = metrics.hypervolume(ours, 0.0), metrics.hypervolume(known, 0.0)
     utilities = metrics.expected_utility(ours), metrics.expected_utility(known)
@@ -74,9 +77,7 @@ def ratios_of_site(points: np.ndarray, best: np.ndarray, low: np.ndarray, high: 
 
 
 def _share(ours: float, known: float) -> float:
-    if not known > 0.0:
-        raise ValueError("a best known front that dominates nothing: it has to be as good as the policies' somewhere")
-    return min(ours / known, 1.0)
+    return min(ours / known, 1.0) if known > 0.0 else np.nan
 
 
 def ratios(policies: Mapping[str, pd.DataFrame], best: pd.DataFrame) -> pd.DataFrame:
@@ -105,7 +106,8 @@ def ratios(policies: Mapping[str, pd.DataFrame], best: pd.DataFrame) -> pd.DataF
 
 def summary(by_split: Mapping[str, pd.DataFrame], inside: str) -> pd.DataFrame:
     """Means over sites of `RATIOS` by policy and split, and the drop from inside to each other split, with 95 % t
-    intervals: paired by site, since a shift keeps the sites' seeds and moves one property.
+    intervals: paired by site, since a shift keeps the sites' seeds and moves one property. Sites without a ratio do not
+    count in it.
 
     by_split : split -> what `ratios` gave; inside : the split within the sampled range.
     """
@@ -122,8 +124,8 @@ def summary(by_split: Mapping[str, pd.DataFrame], inside: str) -> pd.DataFrame:
             here, there = table.loc[policy], tables[inside].loc[policy]
             row = {"policy": policy, "split": split, "sites": len(here)}
             for name in RATIOS:
-                row |= metrics.with_interval(name, here[name].to_numpy())
-                row |= metrics.with_interval(f"{name}_drop", (there[name] - here[name]).to_numpy())
+                row |= metrics.with_interval(name, here[name].dropna().to_numpy())
+                row |= metrics.with_interval(f"{name}_drop", (there[name] - here[name]).dropna().to_numpy())
             rows.append(row)
     return pd.DataFrame(rows)
 
