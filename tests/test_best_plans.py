@@ -25,9 +25,9 @@ def returns_of(plans):
 
 
 def test_the_search_finds_the_best_at_every_weight_within_its_budget():
-    tried = best_plans.search(returns_of, WEIGHTS, 1500, seed=1)
+    tried = best_plans.search(returns_of, WEIGHTS, 4000, seed=1)
     returns = np.array(list(tried.values()))
-    assert len(tried) == 1500
+    assert len(tried) == 4000
     assert (WEIGHTS @ returns.T).max(axis=1).tolist() == [5, 2.5, 5]
     assert list(tried)[:21] == [(action,) * 5 for action in best_plans.ACTIONS]
     assert list(best_plans.search(returns_of, WEIGHTS, 100, seed=1)) == list(tried)[:100]

@@ -188,7 +188,7 @@ def test_a_search_leaves_a_run_and_goes_on_to_the_same_bytes(env_id, vectorizati
         (("--episodes-each", 0), "--episodes-each 0: 1 or more are allowed"),
         (("--population", 600), "--population x --episodes-each 1200: 1000 at most are allowed"),
         (("--total-timesteps", 47), "--total-timesteps 47: a generation has 48"),
-        (("--env-id", "toy_env:toy-v0"), "candidates know the boreal environments alone"),
+        (("--env-id", "toy_env:toy-lockstep-v0"), "candidates know the boreal environments alone"),
     ],
 )
 def test_what_cannot_be_searched_is_refused(arguments, message, tmp_path):
