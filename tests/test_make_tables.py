@@ -318,6 +318,7 @@ def test_shares_of_the_best_known_plans(tmp_path, monkeypatch):
             runs / str(seed), "ppo_gated", seed=seed, carbon=(0, 0, 0, 0, 1), thaw=(seed, 0, 0, 0, 0), weights=weights
         )
     plans = [("12 12 12 12 12", 0, 0), ("20 20 20 20 20", 1, 0), ("20 20 12 12 12", 2, 0), ("24 24 12 12 12", 0, 4)]
+    plans.append(("22 22 12 12 12", 1, 1))
     rows = [
         {"seed": 0, "plan": plan, "found": k, "carbon_return": c - 1.0, "thaw_return": t - 3.0}
         | {"front": k > 1, "half": k > 1, "constant": k < 2}
@@ -345,10 +346,10 @@ def test_the_score_of_three_objectives(tmp_path, monkeypatch):
     plans = [
         {"env_id": "timber_env:timber-v0", "action": action, "seed": seed}
         | {f"{name}_return": value + site for name, value in zip(objectives, values, strict=True)}
-        for action, values in ((12, (0, 0, 0)), (20, (2, 0, 0)), (22, (0, 2, 0)), (0, (0, 0, 4)))
+        for action, values in ((12, (0, 0, 0)), (20, (2, 0, 0)), (24, (0, 2, 0)), (0, (0, 0, 4)))
         for seed, site in ((0, -1.0), (1, 1.0))
     ]
-    others = [{"env_id": MAIN[1], "action": 12, "seed": 0, "carbon_return": 0.0, "thaw_return": 0.0}]
+    others = [{"env_id": MAIN[1], "action": k, "seed": 0, "carbon_return": 0.0, "thaw_return": 0.0} for k in (12, 24)]
     stored.write(tmp_path / "studies" / "constant_plans.csv", pd.DataFrame([*others, *plans]), {})
     monkeypatch.setattr(paths, "studies", lambda quick: tmp_path / "studies")
     make(runs, tmp_path / "tables")
