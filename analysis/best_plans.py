@@ -179,8 +179,9 @@ def main(args: Args) -> None:
     for task in tasks:
         path = folder / f"{task.env_id}.csv"
         settings = {"budget": args.budget, "seed": args.seed, "physics": physics}
-        table = stored.read(path, text=("plan",)) if stored.is_finished(path, settings) else pd.DataFrame({"seed": []})
-        todo = [seed for seed in seeds if seed not in set(table.seed)]
+        tables = [stored.read(path, text=("plan",))] if stored.is_finished(path, settings) else []
+        there = {seed for table in tables for seed in table.seed}
+        todo = [seed for seed in seeds if seed not in there]
         print(f"{task.env_id}: {len(seeds) - len(todo)} of {len(seeds)} sites are in {path}", flush=True)
         protocol.compile_physics(lanes_of(task, len(first_plans())))
         progress, done = protocol.Progress("best plans", args.budget * len(todo), "episodes"), 0
@@ -191,9 +192,10 @@ def main(args: Args) -> None:
             progress.show(done)
 
         for k, seed in enumerate(todo):
-            table = pd.concat([table, study(task, seed, args.budget, args.seed, played)], ignore_index=True)
-            stored.write(path, table, settings)
+            tables.append(study(task, seed, args.budget, args.seed, played))
+            stored.write(path, pd.concat(tables), settings)
             done = (k + 1) * args.budget
+        table = pd.concat(tables, ignore_index=True)
         table = table[table.seed.isin(seeds)]
         print(summary(table, weights_of(task)).to_string(float_format="%.2f"))
         print(f"wrote {ship(table, args.folder, task.env_id)}", flush=True)

@@ -50,7 +50,7 @@ def mean_returns(evaluation: pd.DataFrame) -> pd.DataFrame:
 
 
 def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean over the first axis and half the width of its 95 % t interval (NaN for fewer than two values; of none both)."""
+    """Mean over the first axis, NaN of no values; half the width of its 95 % t interval, NaN of fewer than two."""
     values = np.asarray(values, dtype=float)
     n = len(values)
     if n < 2:
