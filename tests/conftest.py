@@ -13,7 +13,7 @@ from sim.jit import cache_folder
 SLOW = """agents archive backends benchmark claims cuda document_results eupg fronts heuristics hosts make_figures
 make_tables measure_balance mechanisms new_method picture ppo_curriculum ppo_gated ppo_group protocol resume scaling
 sensitivity signal_to_noise soil_column stand_development stress three_objectives training_gains validate variance
-warming"""
+warming moea best_plans"""
 
 
 def pytest_collection_modifyitems(items):
