@@ -37,6 +37,7 @@ from sim.task.episodes import (
     check_reset_options,
     check_saved,
 )
+from sim.task.fronts import discounts, plans_of, play_plans, undominated
 from sim.task.objectives import (
     BALANCED_CARBON_SCALE,
     FIELD_OBJECTIVES,
@@ -270,6 +271,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
         self._describe(1, kwargs)
         self.observation_space = self._episodes.observation_space
         self.action_space = Discrete(NUM_ACTIONS)
+        self._begun_with: int | None = None  # seed of the last reset, if all of the episode follows from it
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Start an episode. options: "preference" (see `fixed_preference`) and "site" (parameter -> value)."""
@@ -278,6 +280,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
         weights = None if preference is None else check_weights(preference, self.reward_dim)
         sim.middle_site(site)
         super().reset(seed=None if seed is None else check_seed("seed", seed))
+        self._begun_with = None if site else seed
         self._episodes.begin([0], [self._episodes.draw(self.np_random)], [weights], [site])
         return self._episodes.observations()[0], {}
 
@@ -306,6 +309,18 @@ class BorealEnv(Described, gym.Env, EzPickle):
 
         return draw_stand(self._episodes, 0)
 
+    def pareto_front(self, gamma: float) -> list[np.ndarray]:
+        """The best known front of the episode, discounted returns (m,) each, as mo-gymnasium's environments have it.
+
+        Known for the published sites alone, after `reset(seed=)` of theirs: returns of the plans that
+        `analysis/best_plans.py` found for this very weather and these dice, which are played anew (seconds). A plan
+        that is worth most at another `gamma` than 1 may be missing.
+        """
+        factors = discounts(gamma, self.years)
+        plans = plans_of(self._arguments, self._begun_with, REGISTERED)
+        rewards = play_plans(self.lockstep(len(plans)), self._begun_with, plans, self.years)
+        return list(undominated(np.einsum("pym,y->pm", rewards, factors)))
+
     def get_state(self) -> dict:
         """Everything the future depends on, generators included; picklable."""
         return {"episodes": self._episodes.get_state(), "generator": self.np_random.bit_generator.state}
@@ -313,6 +328,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
         check_saved(state, "single")
+        self._begun_with = None
         self._episodes.set_state(state["episodes"])
         self.np_random.bit_generator.state = state["generator"]
 

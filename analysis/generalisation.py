@@ -1,21 +1,42 @@
 """How much of the best known front a policy reaches, site by site, inside and outside the range it was trained on.
 
+    python analysis/generalisation.py RUN [RUN ..]                      # outside: four shifts of the test sites
+    python analysis/generalisation.py RUN --split validation calmer     # or any splits
+
+A split is the test or validation sites, or the test sites with one property moved out of the range that sites are drawn
+from (`sim/task/shifts.py`); "outside" is all of those. The test sites are always there, to compare with. A run is a
+finished one with its policy.pt; on the test sites its own evaluation counts, and an archived run will do. Printed are,
+for both policies, the score against the constant plans of the split, two ratios, and how much each drops outside.
+
 The ratios are those of Teoh, Varakantham and Vamplew (2025, ICLR, "On generalization across environments in
 multi-objective reinforcement learning"): NHGR is the hypervolume of a policy's front over that of the site's best known
 front, EUGR the same of the expected utility, each at most 1. Returns are first scaled per site and objective, the
 lowest of all fronts of the site to 0 and the highest to 1, and 0 is the reference point. One departure: theirs takes
 the expected utility of returns as they are; ours may be negative, where a ratio says nothing, so both take scaled ones.
 
+Best known of a site, on every split, are the constant plans, each played on the site's own episode. The test sites that
+`analysis/best_plans.py` has searched have a better front, which then gives rows of their own ("test, best plans").
+
 A table of fronts has a row a point: `site_seed` and a return of each objective (`carbon_return`, ..).
 """
 
+import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import tyro
 
-from analysis import metrics
+import boreal_env
+from analysis import metrics, paths, runs, stored
+from analysis.studies import open_loop
+from cleanrl_style import protocol
+from cleanrl_style.protocol import reference, sites
+from cleanrl_style.protocol.score import Comparison
 
+TEST, OUTSIDE, SEARCHED = "test", "outside", "test, best plans"
 RATIOS = ("nhgr", "eugr")
 
 
@@ -45,7 +66,10 @@ def scaled(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def ratios_of_site(points: np.ndarray, best: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, float]:
-    """NHGR and EUGR of a policy's points (n, m) against the site's best known front (k, m)."""
+    """NHGR and EUGR of a policy's points (n, m) against the site's best known front (k, m).
+
+    NaN where that front dominates nothing: it has two ends alone, and no policy does worse than each in any objective.
+    """
     ours, known = scaled(points, low, high), scaled(best, low, high)
     volumes = metrics.hypervolume(ours, 0.0), metrics.hypervolume(known, 0.0)
     utilities = metrics.expected_utility(ours), metrics.expected_utility(known)
@@ -53,9 +77,7 @@ def ratios_of_site(points: np.ndarray, best: np.ndarray, low: np.ndarray, high: 
 
 
 def _share(ours: float, known: float) -> float:
-    if not known > 0.0:
-        raise ValueError("a best known front that dominates nothing: it has to be as good as the policies' somewhere")
-    return min(ours / known, 1.0)
+    return min(ours / known, 1.0) if known > 0.0 else np.nan
 
 
 def ratios(policies: Mapping[str, pd.DataFrame], best: pd.DataFrame) -> pd.DataFrame:
@@ -84,7 +106,8 @@ def ratios(policies: Mapping[str, pd.DataFrame], best: pd.DataFrame) -> pd.DataF
 
 def summary(by_split: Mapping[str, pd.DataFrame], inside: str) -> pd.DataFrame:
     """Means over sites of `RATIOS` by policy and split, and the drop from inside to each other split, with 95 % t
-    intervals: paired by site, since a shift keeps the sites' seeds and moves one property.
+    intervals: paired by site, since a shift keeps the sites' seeds and moves one property. Sites without a ratio do not
+    count in it.
 
     by_split : split -> what `ratios` gave; inside : the split within the sampled range.
     """
@@ -101,7 +124,135 @@ def summary(by_split: Mapping[str, pd.DataFrame], inside: str) -> pd.DataFrame:
             here, there = table.loc[policy], tables[inside].loc[policy]
             row = {"policy": policy, "split": split, "sites": len(here)}
             for name in RATIOS:
-                row |= metrics.with_interval(name, here[name].to_numpy())
-                row |= metrics.with_interval(f"{name}_drop", (there[name] - here[name]).to_numpy())
+                row |= metrics.with_interval(name, here[name].dropna().to_numpy())
+                row |= metrics.with_interval(f"{name}_drop", (there[name] - here[name]).dropna().to_numpy())
             rows.append(row)
     return pd.DataFrame(rows)
+
+
+# ------------------------------------------------------------------------------------------------- runs, on splits
+
+
+@dataclass
+class Args:
+    """Evaluates finished runs on other sites, and says how much of the best known fronts they reach."""
+
+    runs: tyro.conf.Positional[tuple[Path, ...]]
+    """folders of finished runs, of one environment"""
+    split: tuple[str, ...] = (OUTSIDE,)
+    """test, validation, a shift such as calmer, or outside: all shifts"""
+    episodes: int = 50
+    """the first sites of each split"""
+    output: Path | None = None
+    """table of each policy, split and site (None: results/studies/generalisation.csv)"""
+
+
+def task_of(config: dict) -> protocol.Task:
+    """The environment of a run, with what its policy observes."""
+    arguments = config["arguments"]
+    kwargs = {"thaw_formulation": arguments["thaw_formulation"]} if "thaw_formulation" in config["not_default"] else {}
+    if arguments.get("hide_site"):
+        kwargs["observation_groups"] = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
+    return protocol.Task.of(arguments["env_id"], **kwargs)
+
+
+def splits_of(task: protocol.Task, wanted: Sequence[str]) -> list[str]:
+    """The splits that the flags name, the test sites first; ValueError says what is allowed."""
+    allowed = (*sites.SPLITS, *task.shifts)
+    for name in wanted:
+        if name not in (*allowed, OUTSIDE):
+            raise ValueError(f"--split {name}: allowed are {', '.join((*allowed, OUTSIDE))}")
+    named = [one for name in wanted for one in (task.shifts if name == OUTSIDE else [name])]
+    return list(dict.fromkeys([TEST, *named]))
+
+
+def evaluation_of(folder: Path, config: dict, task: protocol.Task, episodes: int, split: str) -> pd.DataFrame:
+    """A run's episodes on a split, both policies: of the test sites what it left, else played."""
+    if split == TEST:
+        found = runs.read_run(folder).tables["evaluation"]
+        chosen = found[found.seed.isin(sites.evaluation_seeds(task, episodes))]
+        if chosen.seed.nunique() < episodes:
+            raise ValueError(f"{folder}: it was evaluated on {chosen.seed.nunique()} of the {episodes} sites")
+        return chosen
+    weights = config["arguments"]["eval_weights"]
+    return protocol.evaluate(task, protocol.load_agent(folder), weights, episodes, split=split)[0]
+
+
+def known_fronts(plans: pd.DataFrame, evaluation: pd.DataFrame) -> pd.DataFrame:
+    """Plans' returns on a split's episodes as a table of fronts; evaluation : a policy's on the same episodes."""
+    site_of = evaluation.drop_duplicates("seed").set_index("seed").site_seed
+    known = plans[plans.seed.isin(site_of.index)]
+    return known.assign(site_seed=site_of.loc[known.seed].to_numpy())
+
+
+def judged(evaluations: Mapping[str, pd.DataFrame], plans: pd.DataFrame) -> pd.DataFrame:
+    """`ratios` of policies' evaluations on the sites of some plans, against those plans."""
+    some = next(iter(evaluations.values()))
+    of_sites = {name: fronts(table[table.seed.isin(plans.seed)]) for name, table in evaluations.items()}
+    return ratios(of_sites, known_fronts(plans, some))
+
+
+def searched_plans(task: protocol.Task) -> pd.DataFrame | None:
+    """What analysis/best_plans.py found in this physics; None if it has not been run, which is said."""
+    path = paths.studies() / "best_plans" / f"{task.env_id}.csv"
+    if set(task.env_kwargs) - {"observation_groups"}:
+        return None
+    if not path.exists() or stored.settings_of(path)["physics"] != open_loop.fingerprint():
+        print(f"{path} is not there, or of another physics: `python analysis/best_plans.py` makes it")
+        return None
+    table = stored.read(path, text=("plan",))
+    return table[table.front]
+
+
+def main(args: Args) -> None:
+    """Judge the runs on every split, print the summary, write the sites' ratios."""
+    try:
+        configs = {folder: runs.read_config(folder) for folder in args.runs}
+        tasks = [task_of(config) for config in configs.values()]
+        if not tasks or len({task.env_id for task in tasks}) > 1 or not tasks[0].draws_sites:
+            raise ValueError("one run or more are allowed, of one boreal environment that draws its sites")
+        splits = splits_of(tasks[0], args.split)
+        scores, found = {}, {}
+        for split in splits:
+            evaluations = {}
+            for (folder, config), task in zip(configs.items(), tasks, strict=True):
+                table = evaluation_of(folder, config, task, args.episodes, split)
+                evaluations |= {f"{folder}, {policy}": rows for policy, rows in table.groupby("policy")}
+            shifted, seeds = sites.of_split(tasks[0], args.episodes, split)
+            plans = reference.reference_returns(shifted, seeds)
+            plans = plans[plans.plan.str.isdigit()]
+            found[split] = judged(evaluations, plans)
+            for name, table in evaluations.items():
+                scores[name, split] = Comparison(table, plans).score(table.policy.iloc[0])
+            best = searched_plans(tasks[0]) if split == TEST else None
+            if best is not None and set(seeds) & set(best.seed):
+                found[SEARCHED] = judged(evaluations, best[best.seed.isin(seeds)])
+    except (ValueError, FileNotFoundError) as error:
+        sys.exit(f"error: {error}")
+    path = args.output or paths.studies() / "generalisation.csv"
+    settings = {"runs": [str(folder) for folder in args.runs], "episodes": args.episodes, "splits": splits}
+    stored.write(path, pd.concat([table.assign(split=split) for split, table in found.items()]), settings)
+    report(found, scores)
+    print(f"\nwrote {path}")
+
+
+def report(found: Mapping[str, pd.DataFrame], scores: Mapping[tuple, float]) -> None:
+    """Print the means over sites by policy and split, with the drop from the test sites and its 95 % interval."""
+    searched = {name: table for name, table in found.items() if name == SEARCHED}
+    parts = [summary({name: table for name, table in found.items() if name != SEARCHED}, TEST)]
+    parts += [summary(searched, SEARCHED)] if searched else []
+    table = pd.concat(parts, ignore_index=True)
+    for policy, rows in table.groupby("policy", sort=False):
+        print(f"\n{policy}\n{'split':18s} sites  score   NHGR  drop (95 %)            EUGR  drop (95 %)")
+        for row in rows.to_dict("records"):
+            score = scores.get((policy, row["split"]), np.nan)
+            line = f"{row['split']:18s} {row['sites']:5d}" + (" " * 7 if np.isnan(score) else f"{score:7.0f}")
+            for name in RATIOS:
+                drop, low, high = (row[f"{name}_drop{end}"] for end in ("", "_low", "_high"))
+                shown = "" if row["split"] in (TEST, SEARCHED) else f"{drop:+.2f} ({low:+.2f} .. {high:+.2f})"
+                line += f"  {row[name]:5.2f}  {shown:21s}"
+            print(line.rstrip())
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

@@ -18,6 +18,7 @@ from pathlib import Path
 from analysis import paths
 from analysis.results import Results
 from analysis.tables import (
+    best_known,
     curriculum_selection,
     detailed_objectives,
     distance_to_best,
@@ -50,6 +51,7 @@ TABLES = (
     learning_difficulty,
     single_sites,
     distance_to_best,
+    best_known,
 )
 
 EXPLANATION = """Score: 0 is to do nothing, 100 the best constant plan of each weight. Interquartile mean over training

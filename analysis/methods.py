@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 CONDITIONED = "conditioned on the preference"
 FIXED_WEIGHT = "trained for one weight"
+POPULATION = "a population, one of which is chosen for each weight"
 HEURISTIC = "fixed strategy of the paper"
 CONTROL = "fixed strategy of ours"
 OTHERS = "of another library"
@@ -24,7 +25,7 @@ class Method:
     @property
     def trains(self) -> bool:
         """Whether it is trained."""
-        return self.kind in (CONDITIONED, FIXED_WEIGHT, OTHERS)
+        return self.kind in (CONDITIONED, FIXED_WEIGHT, POPULATION, OTHERS)
 
     @property
     def path(self) -> str:
@@ -49,6 +50,7 @@ ROWS = (
     Method("envelope", "Envelope", OTHERS, "#CC79A7", "8"),
     Method("morld", "MORL/D", OTHERS, "#D55E00", "X"),
     Method("maskable_ppo", "MaskablePPO", OTHERS, "#0072B2", "d"),
+    Method("moea", "NSGA-II", POPULATION, "#56B4E9", "H"),
 )
 METHODS = {method.script: method for method in ROWS}
 

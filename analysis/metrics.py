@@ -50,11 +50,12 @@ def mean_returns(evaluation: pd.DataFrame) -> pd.DataFrame:
 
 
 def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean over the first axis and half the width of its 95 % t interval (NaN for fewer than two values)."""
+    """Mean over the first axis, NaN of no values; half the width of its 95 % t interval, NaN of fewer than two."""
     values = np.asarray(values, dtype=float)
     n = len(values)
     if n < 2:
-        return values.mean(axis=0), np.full(values.shape[1:], np.nan)
+        unknown = np.full(values.shape[1:], np.nan)
+        return values[0] if n else unknown, unknown
     return values.mean(axis=0), scipy.stats.t.ppf(0.975, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
 
 

@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 
 from analysis import experiments, methods, metrics, paths, reduction, runs, stored
+from analysis.studies.constant_plans import of_environment
+from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
 
 PAIR = ["carbon", "thaw"]  # the paper's objectives
@@ -140,11 +142,11 @@ class Results:
 
     def plans(self, evaluation, env_id, thaw_formulation="asymmetric", site_seed=None) -> pd.DataFrame | None:
         """Gains of the constant plans on an evaluation's episodes; None if they were not evaluated on them."""
-        table, columns = self.constant_plans, metrics.return_columns(PAIR)
-        its_objectives = metrics.objectives_of(evaluation.columns)
-        if table is None or its_objectives != PAIR or thaw_formulation != "asymmetric" or site_seed is not None:
+        columns = metrics.return_columns(metrics.objectives_of(evaluation.columns))
+        table = self.constant_plans_in(env_id, thaw_formulation, site_seed)
+        if table is None or not set(columns) <= set(table.columns):
             return None
-        table = table[(table.env_id == env_id) & table.seed.isin(evaluation.seed)]
+        table = table[table.seed.isin(evaluation.seed)]
         if set(table.seed) != set(evaluation.seed):
             return None
         table = table.assign(plan=table.action.astype(str))[["plan", "seed", *columns]]
@@ -160,14 +162,22 @@ class Results:
         return metrics.gains(evaluation, longest) if known else None
 
     def zero_change(self, env_id, thaw_formulation, site_seed) -> pd.DataFrame | None:
-        """The longest evaluation of zero change under these conditions; None without one."""
+        """The longest evaluation of zero change under these conditions, else that constant plan; None without one."""
         conditions = {"env_id": env_id, "thaw_formulation": thaw_formulation, "site_seed": site_seed}
         same = [
             run.evaluation
             for run in self.runs
             if run.script == "zero_change" and all(run.arguments[name] == value for name, value in conditions.items())
         ]
-        return max(same, key=len, default=None)
+        plans = None if same else self.constant_plans_in(**conditions)
+        return max(same, key=len, default=None) if plans is None else plans[plans.action == NO_CHANGE]
+
+    def constant_plans_in(self, env_id, thaw_formulation, site_seed) -> pd.DataFrame | None:
+        """The study of constant plans under these conditions, with the returns of the environment's objectives."""
+        if self.constant_plans is None or thaw_formulation != "asymmetric" or site_seed is not None:
+            return None
+        table = of_environment(self.constant_plans, env_id)
+        return table if len(table) else None
 
     @cached_property
     def constant_plans(self) -> pd.DataFrame | None:

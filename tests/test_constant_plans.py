@@ -38,3 +38,20 @@ def test_the_study_has_every_constant_plan_and_no_strategy(monkeypatch):
     monkeypatch.setattr(constant_plans, "reference_returns", lambda task, seeds: plans)
     table = constant_plans.study("boreal-generalist-v0", 1)
     assert table.action.tolist() == [12, 24] and set(table.env_id) == {"boreal-generalist-v0"}
+
+
+def test_an_environment_has_the_returns_of_its_objectives():
+    two = pd.DataFrame(
+        {"env_id": "two", "action": [12, 24], "seed": 1, "carbon_return": 0.0, "thaw_return": [0.0, 1.0]}
+    )
+    three = pd.DataFrame({"env_id": "three", "action": [12, 24, 22], "seed": 1, "carbon_return": [0.0, 0.0, 1.0]})
+    three = three.assign(thaw_return=[0.0, 1.0, 0.0], timber_return=[0.0, 3.0, 0.0])
+    both = pd.concat([two, three], ignore_index=True)
+    assert "timber_return" not in constant_plans.of_environment(both, "two")
+    best = constant_plans.as_evaluation(constant_plans.of_environment(both, "two"), (0.0, 1.0), best=True)
+    assert best.action.tolist() == [24, 12] and best.preference.tolist() == [0.0, 1.0]
+    weights = ((1.0, 0.0, 0.0), (0.0, 0.5, 0.5))
+    best = constant_plans.as_evaluation(constant_plans.of_environment(both, "three"), weights, best=True)
+    assert best.action.tolist() == [22, 24] and best.scalarized_return.tolist() == [1.0, 2.0]
+    dense = constant_plans.as_evaluation(constant_plans.of_environment(both, "three"), weights, best=False)
+    assert dense.action.tolist() == [24, 24] and dense.weight_timber.tolist() == [0.0, 0.5]

@@ -1,12 +1,18 @@
 """Shifted sites, and the ratios by which a policy generalises, on cases worked by hand."""
 
+import json
+import shutil
+
 import numpy as np
 import pandas as pd
 import pytest
 from playing import quick
+from tiny_runs import TINY_RUNS
 
 import sim
-from analysis import generalisation
+from analysis import generalisation, paths, stored
+from cleanrl_style import protocol
+from cleanrl_style.protocol import sites
 from sim.task.episodes import BALANCED_WORLD
 from sim.task.shifts import INSIDE, SHIFTS, shifted, shifts_of
 
@@ -107,3 +113,104 @@ def test_what_cannot_be_compared_is_refused():
         generalisation.summary({"a": one.assign(site_seed=2), "b": one}, "b")
     with pytest.raises(ValueError, match=r"split 'c': allowed are a"):
         generalisation.summary({"a": one}, "c")
+
+
+# ---------------------------------------------------------------------------------------------------- the command
+
+WEIGHTS = (0.0, 1.0)
+SEEDS = sites.published_seeds("test")[:2]
+
+
+def episodes(gain, seeds=SEEDS):
+    """Both policies on two sites: carbon `gain` at weight 1, thaw `gain` at weight 0."""
+    rows = [
+        {"policy": policy, "preference": w, "episode": k, "seed": seed, "site_seed": k}
+        | {"carbon_return": k + gain * w, "thaw_return": k + gain * (1 - w), "scalarized_return": k + gain}
+        for policy in protocol.POLICIES
+        for w in WEIGHTS
+        for k, seed in enumerate(seeds)
+    ]
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """A finished run that gains 2 on the test sites and 1 on all others, where plans gain 4; nothing is simulated."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    arguments = {"env_id": "boreal-balanced-v0", "mode": "generalist", "seed": 1, "site_seed": None}
+    arguments |= {"eval_weights": WEIGHTS, "eval_episodes": 2, "thaw_formulation": "asymmetric"}
+    config = {"script": "plus_100", "arguments": arguments, "not_default": {}, "primary_policy": "greedy"}
+    (folder / "config.json").write_text(json.dumps(config))
+    episodes(2.0).to_csv(folder / "evaluation.csv", index=False)
+    shutil.copy(TINY_RUNS / "zero_change" / "timing.csv", folder)
+    played = []
+
+    def evaluate(task, policy, weights, number, split):
+        played.append((task.env_id, tuple(weights), number, split))
+        return episodes(1.0, sites.of_split(task, number, split)[1]), None
+
+    def plans(task, seeds):
+        rows = [
+            {"plan": plan, "seed": seed, "carbon_return": k + c, "thaw_return": k + t}
+            for k, seed in enumerate(seeds)
+            for plan, c, t in (("12", 0.0, 0.0), ("20", 4.0, 0.0), ("24", 0.0, 4.0), ("22", 2.0, 2.0))
+        ]
+        return pd.DataFrame(rows)
+
+    monkeypatch.setattr(protocol, "evaluate", evaluate)
+    monkeypatch.setattr(protocol, "load_agent", lambda folder: None)
+    monkeypatch.setattr(generalisation.reference, "reference_returns", plans)
+    monkeypatch.setattr(generalisation.open_loop, "fingerprint", lambda: "physics")
+    monkeypatch.setattr(paths, "studies", lambda: tmp_path / "studies")
+    return folder, played
+
+
+def judge(folder, **arguments):
+    output = folder.parent / "out.csv"
+    generalisation.main(generalisation.Args(runs=(folder,), episodes=2, output=output, **arguments))
+    return stored.read(output).groupby(["split", "policy"])[list(generalisation.RATIOS)].mean()
+
+
+def test_a_run_is_judged_inside_and_outside(run, capsys):
+    folder, played = run
+    found = judge(folder)
+    shifts = protocol.Task.of("boreal-balanced-v0").shifts
+    assert played == [("boreal-balanced-v0", WEIGHTS, 2, shift) for shift in shifts]
+    # gains (0, 2), (2, 0) in a scale of 4, of a front (0, 4), (4, 0), (2, 2): no volume above the lowest of all
+    assert (found.nhgr == 0).all()
+    utility = np.maximum(np.linspace(0, 1, 50), np.linspace(1, 0, 50)).mean()
+    of_plans = 4 * utility
+    name = next(name for name in found.index.levels[1] if name.endswith("greedy"))
+    assert found.eugr["test", name] == pytest.approx(2 * utility / of_plans)
+    assert found.eugr[shifts[0], name] == pytest.approx(1 * utility / of_plans)
+    out = capsys.readouterr().out
+    assert "python analysis/best_plans.py` makes it" in out
+    assert "     2     50" in out and "     2     25" in out and "+0.25" in out
+
+
+def test_searched_plans_give_rows_of_their_own(run, tmp_path):
+    folder, played = run
+    table = pd.DataFrame(
+        [
+            (SEEDS[0], "24", 1, True, 0.0, 8.0),
+            (SEEDS[0], "20", 2, True, 8.0, 0.0),
+            (SEEDS[0], "12", 3, False, 0.0, 0.0),
+        ],
+        columns=["seed", "plan", "found", "front", "carbon_return", "thaw_return"],
+    )
+    stored.write(tmp_path / "studies" / "best_plans" / "boreal-balanced-v0.csv", table, {"physics": "physics"})
+    found = judge(folder, split=("validation", "calmer"))
+    assert [call[3] for call in played] == ["validation", "calmer"]
+    rows = found.loc[generalisation.SEARCHED]
+    assert len(rows) == 2 and rows.eugr.tolist() == pytest.approx([0.25, 0.25])
+
+
+def test_a_split_or_a_run_that_is_not_there(run, tmp_path):
+    folder, _ = run
+    with pytest.raises(SystemExit, match="--split hotter: allowed are test, validation, warmer_air, .*, outside"):
+        judge(folder, split=("hotter",))
+    with pytest.raises(SystemExit, match="it was evaluated on 2 of the 3 sites"):
+        generalisation.main(generalisation.Args(runs=(folder,), episodes=3))
+    with pytest.raises(SystemExit, match="config.json"):
+        judge(tmp_path / "nowhere")

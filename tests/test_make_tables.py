@@ -12,12 +12,14 @@ from analysis import archive, experiments, make_figures, make_tables, paths, sto
 from analysis.results import Results
 from analysis.studies.signal_to_noise import CONTRASTS
 from analysis.tables import (
+    best_known,
     curriculum_selection,
     growing_season_correlations,
     learning_difficulty,
     physical_conflicts,
     single_sites,
 )
+from cleanrl_style.protocol.fronts import simplex_lattice
 
 MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")
 
@@ -106,7 +108,7 @@ def test_season_violations_runtime_details(tables):
 
 
 def test_all_tables_in_all_formats(tables):
-    assert len(make_tables.TABLES) == 13
+    assert len(make_tables.TABLES) == 14
     for module in make_tables.TABLES:
         stem = tables / make_tables.name_of(module)
         rows = len(pd.read_csv(stem.with_suffix(".csv")))
@@ -304,6 +306,62 @@ def test_the_score_of_both_policies(tmp_path, monkeypatch):
     assert row.gain_scalarized == pytest.approx((6.5 + 7) / 6) and row.seeds_to_tell == 23
     assert table.score_sampled["best_constant_mix", MAIN[1], "default"] == pytest.approx(100)
     assert table.score_sampled["zero_change"].dropna().tolist() == [0]
+
+
+def test_shares_of_the_best_known_plans(tmp_path, monkeypatch):
+    """On two sites, one of them searched: doing nothing has 0, the best plans 4 of thaw or 2 of carbon."""
+    runs, nothing = tmp_path / "runs", (0,) * 5
+    weights = best_known.WEIGHTS
+    write_run(runs / "zero", "zero_change", carbon=nothing, thaw=nothing, weights=weights)
+    for seed in (1, 2):
+        write_run(
+            runs / str(seed), "ppo_gated", seed=seed, carbon=(0, 0, 0, 0, 1), thaw=(seed, 0, 0, 0, 0), weights=weights
+        )
+    plans = [("12 12 12 12 12", 0, 0), ("20 20 20 20 20", 1, 0), ("20 20 12 12 12", 2, 0), ("24 24 12 12 12", 0, 4)]
+    plans.append(("22 22 12 12 12", 1, 1))
+    rows = [
+        {"seed": 0, "plan": plan, "found": k, "carbon_return": c - 1.0, "thaw_return": t - 3.0}
+        | {"front": k > 1, "half": k > 1, "constant": k < 2}
+        for k, (plan, c, t) in enumerate(plans)
+    ]
+    stored.write(tmp_path / "studies" / "best_plans" / f"{MAIN[1]}.csv", pd.DataFrame(rows), {})
+    monkeypatch.setattr(paths, "studies", lambda quick: tmp_path / "studies")
+    make(runs, tmp_path / "tables")
+    table = read(tmp_path / "tables", "best_known", ["method", "policy"])
+    row = table.loc[("ppo_gated", "sampled")]
+    assert (row.seeds, row.sites) == (2, 1)
+    assert row[["share_0", "share_0.25", "share_1"]].tolist() == pytest.approx([100 * 1.5 / 4, 0, 50])
+    assert row.share == pytest.approx(100 * (1.5 + 1) / (4 + 3 + 2 + 1.5 + 2))
+    # greedy has 100 more of both, sampled only ends
+    assert table.loc[("ppo_gated", "greedy")].nhgr == 1 and row.nhgr == 0
+    assert 0 < row.eugr < 1
+    blind = table.xs(best_known.CONSTANT).iloc[0]
+    assert blind[["share_0", "share_1"]].tolist() == pytest.approx([0, 50])
+
+
+def test_the_score_of_three_objectives(tmp_path, monkeypatch):
+    """Best constant plans: 4 of timber, 2 of each other, and no run of zero change: that plan is one of them."""
+    runs, objectives = tmp_path / "runs", ("carbon", "thaw", "timber")
+    write_run_of_three(runs / "ours", "ppo_gated", [(1, 0, 0), (0, 1, 0), (0, 0, 3)])
+    plans = [
+        {"env_id": "timber_env:timber-v0", "action": action, "seed": seed}
+        | {f"{name}_return": value + site for name, value in zip(objectives, values, strict=True)}
+        for action, values in ((12, (0, 0, 0)), (20, (2, 0, 0)), (24, (0, 2, 0)), (0, (0, 0, 4)))
+        for seed, site in ((0, -1.0), (1, 1.0))
+    ]
+    others = [{"env_id": MAIN[1], "action": k, "seed": 0, "carbon_return": 0.0, "thaw_return": 0.0} for k in (12, 24)]
+    stored.write(tmp_path / "studies" / "constant_plans.csv", pd.DataFrame([*others, *plans]), {})
+    monkeypatch.setattr(paths, "studies", lambda quick: tmp_path / "studies")
+    make(runs, tmp_path / "tables")
+    table = read(tmp_path / "tables", "main_results_timber-v0", "method")
+    assert table.score_greedy["ppo_gated"] == pytest.approx(100 * (1 + 1 + 3) / (2 + 2 + 4))
+    assert table.score_greedy["best_constant_mix"] == pytest.approx(100)
+    assert table.gain_hypervolume["ppo_gated"] == 0  # each point gains in one objective alone
+    # of a lattice of 15 weights
+    weights = table.loc["best_constant_mix"]
+    assert weights.gain_scalarized == pytest.approx(
+        np.mean([max(2 * a, 2 * b, 4 * c) for a, b, c in simplex_lattice(3, 4)])
+    )
 
 
 def test_a_policy_without_preference_has_neither_sparsity_nor_response(tables):

@@ -75,11 +75,10 @@ def baselines(results, nothing) -> list[tuple]:
     if zero is None:
         return []
     evaluated = [(method.title, method.colour, evaluation) for method, evaluation in fixed]
-    plans = results.study("constant_plans")
+    plans = results.constant_plans_in(results.first_job("main", LEARNERS[0]).env_id, "asymmetric", None)
     if plans is not None:
-        env_id = results.first_job("main", LEARNERS[0]).env_id
         weights = sorted(zero.preference.unique())
-        best = constant_plans.as_evaluation(plans[plans.env_id == env_id], weights, best=True)
+        best = constant_plans.as_evaluation(plans, weights, best=True)
         evaluated.append((BEST, "#000000", best))
     carbon, thaw = nothing.carbon_return.mean(), nothing.thaw_return.mean()
     start = {"carbon": carbon, "thaw": thaw, "scalarized": (carbon + thaw) / 2}  # a training's mean weight is 1/2

@@ -24,7 +24,7 @@ from analysis.paper_claims.claim import (
     within,
 )
 from analysis.paper_claims.evidence import VARIANCE, difference, first_and_last, mean_of, only, optional, seeds
-from analysis.studies.constant_plans import as_evaluation, best_gains
+from analysis.studies.constant_plans import as_evaluation, best_gains, of_environment
 from analysis.tables import single_sites
 
 TITLE = "Learning one objective at a time"
@@ -57,7 +57,7 @@ def learnt(evidence, weight: float) -> pd.Series:
 def attainable(evidence, weight: float) -> float:
     """What the best constant plan for the weight has over random valid actions."""
     plans = evidence.study("constant_plans")
-    best = as_evaluation(plans[plans.env_id == GENERALIST], (weight,), best=True)
+    best = as_evaluation(of_environment(plans, GENERALIST), (weight,), best=True)
     return less_random(evidence, best, OBJECTIVE[weight])
 
 

@@ -3,7 +3,8 @@
     python analysis/studies/constant_plans.py
 
 Every action every year, wherever it can be carried out: on the evaluation's episodes, where the score is measured by
-them (cleanrl_style/protocol/reference.py), and on the single sites of the experiments, where all episodes are one.
+them (cleanrl_style/protocol/reference.py), of environments with two objectives and with more; and on the single sites
+of the experiments, where all episodes are one.
 Leaves results/studies/constant_plans.csv and constant_plans_of_sites.csv, one row an episode.
 """
 
@@ -19,9 +20,12 @@ import sim
 from analysis import experiments, metrics, paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
+from cleanrl_style.protocol import score
 from cleanrl_style.protocol.reference import reference_returns
+from sim.task.preference import check_weights
 
 ENVIRONMENTS = (experiments.GENERALIST, experiments.BALANCED)
+MORE_OBJECTIVES = ("boreal-timber-v0", "boreal-four-v0")  # measured on first use: their returns do not ship
 DENSE_CONIFER = 24
 
 
@@ -41,7 +45,7 @@ def study(env_id: str, episodes: int) -> pd.DataFrame:
     table = reference_returns(task, protocol.evaluation_seeds(task, episodes))
     table = table[table.plan.str.isdigit()]
     table = table.assign(env_id=env_id, action=table.plan.astype(int))
-    return table[["env_id", "action", "seed", "carbon_return", "thaw_return"]]
+    return table[["env_id", "action", "seed", *metrics.return_columns(task.objectives)]]
 
 
 def study_of_sites(seeds) -> pd.DataFrame:
@@ -69,19 +73,22 @@ def best_gains(plans: pd.DataFrame, objective: str) -> pd.Series:
     return returns.max() - returns.loc[boreal_env.NO_CHANGE]
 
 
-def as_evaluation(plans: pd.DataFrame, weights, best: bool) -> pd.DataFrame:
-    """The study's rows of one environment as an evaluation: dense conifer, or at each weight the best plan.
+def of_environment(plans: pd.DataFrame, env_id: str) -> pd.DataFrame:
+    """The study's rows of one environment, with the returns of its objectives alone."""
+    return plans[plans.env_id == env_id].dropna(axis="columns", how="all")
 
-    The best is chosen on the very episodes that it is reported on, which flatters it a little.
+
+def as_evaluation(plans: pd.DataFrame, weights, best: bool) -> pd.DataFrame:
+    """Rows `of_environment` as an evaluation: dense conifer, or at each weight the best plan.
+
+    weights : as flags have them. The best is chosen on the very episodes that it is reported on, which flatters it a
+    little.
     """
-    rows = []
-    for weight in weights:
-        returns = plans[["carbon_return", "thaw_return"]].to_numpy()
-        scalarized = pd.Series(protocol.scalarize(returns, metrics.pair(weight)), plans.index)
-        action = scalarized.groupby(plans.action).mean().idxmax() if best else DENSE_CONIFER
-        chosen = plans.action == action
-        rows.append(plans[chosen].assign(preference=weight, scalarized_return=scalarized[chosen]))
-    return pd.concat(rows, ignore_index=True)
+    objectives = metrics.objectives_of(plans.columns)
+    weights = np.array([check_weights(value, len(objectives)) for value in weights])
+    if best:
+        return score.best_constant_plans(plans.assign(plan=plans.action.astype(str)), weights)
+    return score.at_weights(plans[plans.action == DENSE_CONIFER], weights)
 
 
 def main(args: Args) -> None:
@@ -93,7 +100,7 @@ def main(args: Args) -> None:
     tables = {
         "constant_plans": (
             {"episodes": args.eval_episodes, "physics": physics},
-            lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in ENVIRONMENTS]),
+            lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in (*ENVIRONMENTS, *MORE_OBJECTIVES)]),
         ),
         "constant_plans_of_sites": ({"sites": sites, "physics": physics}, lambda: study_of_sites(sites)),
     }

@@ -72,8 +72,7 @@ def read_plans(folder: Path, physics: str) -> dict[int, pd.DataFrame]:
     """
     plans = {}
     for path in sorted(folder.glob("*-all-on.csv")):
-        with path.open(encoding="utf-8") as file:
-            made_by = json.loads(file.readline().removeprefix("#"))
+        made_by = stored.settings_of(path)
         site = made_by["case"][0]
         if made_by["physics"] != physics:
             sys.exit(f"error: {path} is of another physics; `python analysis/studies/fronts.py` makes it anew")

@@ -156,17 +156,17 @@ def paper_rows() -> pd.DataFrame:
     )
 
 
-def constant_plans(results) -> dict[tuple, list]:
+def constant_plans(results, env_ids=ENVIRONMENTS) -> dict[tuple, list]:
     """Rows of the constant plans: (name, environment, setting) -> its evaluation, as a replicate without a run."""
-    plans = results.constant_plans
     rows = {}
-    for env_id in ENVIRONMENTS:
+    for env_id in env_ids:
         for name, (_, best) in CONSTANT_PLANS.items():
             key = name, env_id, "default"
             rows[key] = []
-            of_env = None if plans is None else plans[plans.env_id == env_id]
-            if of_env is not None and len(of_env):
-                evaluation = as_evaluation(of_env, evaluation_weights(2), best)
+            plans = results.constant_plans_in(env_id, "asymmetric", None)
+            if plans is not None:
+                number = len(metrics.objectives_of(plans.columns))
+                evaluation = as_evaluation(plans, evaluation_weights(number), best)
                 rows[key] = [results.replicate([], dict.fromkeys(protocol.POLICIES, evaluation), PRIMARY, env_id)]
     return rows
 

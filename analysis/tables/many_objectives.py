@@ -1,7 +1,8 @@
 """Two tables for each environment that has other objectives than carbon and thaw, of the paper's main ones.
 
-main_results_<environment> has the metrics of every method there, detailed_objectives_<environment> the returns, and the
-gains over zero change, at each weight. The paper has neither.
+main_results_<environment> has the metrics of every method there, and of constant plans if
+analysis/studies/constant_plans.py has played them; detailed_objectives_<environment> the returns, and the gains over
+zero change, at each weight. The paper has neither.
 """
 
 import pandas as pd
@@ -58,6 +59,7 @@ def make(results) -> dict[str, tuple[pd.DataFrame, dict]]:
         rows = {key: one for key, one in results.rows.items() if key[1] == env_id and one}
         objectives = results.objectives(env_id)
         if objectives != PAIR:
+            rows |= {key: one for key, one in main_results.constant_plans(results, [env_id]).items() if one}
             name = file_stem(env_id)
             tables[f"main_results_{name}"] = main_table(rows, objectives)
             tables[f"detailed_objectives_{name}"] = detailed_table(rows, objectives)

@@ -84,9 +84,13 @@ def bare(source: str) -> str:
 
 
 def write(path: Path, table: pd.DataFrame, physics: str) -> None:
-    """Write returns with the fingerprint of their physics; the same returns give the same bytes."""
+    """Write returns with the fingerprint of their physics."""
+    pack(path, f"# {json.dumps({'physics': physics})}\n" + as_text(table))
+
+
+def pack(path: Path, text: str) -> None:
+    """Write a compressed text; the same text gives the same bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    text = f"# {json.dumps({'physics': physics})}\n" + as_text(table)
     with replacing(path) as file, gzip.GzipFile("", "wb", 9, file, mtime=0) as packed:
         packed.write(text.encode())
 
