@@ -7,28 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-import torch
-import torch.nn as nn
-
-from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts
-
-NO_CHANGE = 12
-LEVELS = np.linspace(-1, 1, 5)  # genes of the five density changes, and of the five conifer shares
-# What a policy looks at: where the stand is, and of its site what decides gains.
-INPUTS = (
-    "year",
-    "density",
-    "conifer_fraction",
-    "biomass",
-    "soil",
-    "site_latitude_deg",
-    "site_mean_annual_temperature_c",
-    "site_deep_boundary_temperature_k",
-    "site_winter_snow_mm_day",
-    "site_wind_speed_m_s",
-)
+from cleanrl_style.flags import parse
 
 
 @dataclass
@@ -79,6 +58,33 @@ class Args:
     """project of Weights & Biases"""
 
     num_envs = 1  # no flag: population x episodes_each
+
+
+if __name__ == "__main__":
+    args = parse(Args)  # a bad flag is answered before all that follows is loaded
+
+import numpy as np
+import torch
+import torch.nn as nn
+
+from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts
+
+NO_CHANGE = 12
+LEVELS = np.linspace(-1, 1, 5)  # genes of the five density changes, and of the five conifer shares
+# What a policy looks at: where the stand is, and of its site what decides gains.
+INPUTS = (
+    "year",
+    "density",
+    "conifer_fraction",
+    "biomass",
+    "soil",
+    "site_latitude_deg",
+    "site_mean_annual_temperature_c",
+    "site_deep_boundary_temperature_k",
+    "site_winter_snow_mm_day",
+    "site_wind_speed_m_s",
+)
 
 
 # --------------------------------------------------------------------------------------------------- a candidate
@@ -200,7 +206,6 @@ def nondominated(genes, gains):
 
 
 if __name__ == "__main__":
-    args = protocol.parse(Args)
     if importlib.util.find_spec("pymoo") is None:
         protocol.fail('pymoo is not installed: pip install -e ".[planners]"')
     task = protocol.make_task(args, hide_site=args.hide_site)

@@ -413,7 +413,7 @@ class Store:
             "arguments": {name: without_addresses(value) for name, value in sorted(plan.arguments.items())},
         }
         self.path: Any = None if path is None else Path(path)
-        self.partial: Any = None if path is None else self.path.with_name(self.path.name + ".partial")
+        self.partial: Any = None if path is None else Path(path).with_name(Path(path).name + ".partial")
         self.overwrite = overwrite
         self.group: Any = None
         self.lock: Any = None
@@ -481,9 +481,9 @@ class Store:
         group = zarr.create_group(store, zarr_format=3, attributes=attributes)
         for name in plan.table:
             values = plan.table[name].to_numpy()
-            unit = {"units": COLUMNS[name][2]} if COLUMNS[name][2] else {}
+            units = {"units": COLUMNS[name][2]} if COLUMNS[name][2] else {}
             group.create_array(
-                coordinate(name), data=values, chunks=(number,), dimension_names=("stand",), attributes=unit
+                coordinate(name), data=values, chunks=(number,), dimension_names=("stand",), attributes=units
             )
         group.create_array("year", data=np.arange(plan.years), chunks=(plan.years,), dimension_names=("year",))
         for name in (*plan.variables, "action"):
