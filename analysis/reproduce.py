@@ -8,13 +8,25 @@
 One process a core. A job whose run is finished is not started; an interrupted one goes on where it stopped.
 """
 
+import importlib.util
 import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from analysis import archive, claims, commands, document_results, experiments, make_figures, make_tables, paths, runs
+from analysis import (
+    archive,
+    claims,
+    commands,
+    document_results,
+    experiments,
+    make_figures,
+    make_tables,
+    methods,
+    paths,
+    runs,
+)
 from cleanrl_style import protocol
 from sim.block import KERNELS
 from sim.executor import HERE, check_address
@@ -73,6 +85,14 @@ def main(args: Args) -> None:
     for script in dict.fromkeys(job.script for job in jobs if not job.exists):
         print(f"no script yet: {script}.py; its jobs are left out", file=sys.stderr)
     jobs = [job for job in jobs if job.exists]
+    libraries = [name for name in ("morl_baselines", "sb3_contrib") if importlib.util.find_spec(name) is None]
+    if libraries and any(job.script in methods.OUTSIDE for job in jobs):
+        jobs = [job for job in jobs if job.script not in methods.OUTSIDE]
+        print(
+            f"not installed: {', '.join(libraries)} (pip install -e '.[outside]'); algorithms of other libraries are "
+            "left out",
+            file=sys.stderr,
+        )
     runs_dir, archive_dir = paths.runs(args.quick), paths.archive(args.quick)
     roots = (runs_dir, archive_dir) if args.skip_archived else (runs_dir,)
     configs = finished_configs(*roots)

@@ -5,6 +5,7 @@ repository, from which the pages below are taken, and nothing has to be rewritte
 """
 
 import ast
+import importlib
 import inspect
 import re
 import sys
@@ -64,7 +65,20 @@ def as_myst(app, docname, source):
         patterns = re.findall(r"^\S+\*$", text, re.MULTILINE)
         for pattern in (pattern for pattern in patterns if not any(Path(__file__).parent.glob(pattern + ".*"))):
             text = text.replace(f"{pattern}\n", "")
-    source[0] = text
+    source[0] = re.sub(r"(\.\. automodule:: (\S+)\n(?: +:.*\n)+)", lambda found: found[1] + others(found[2]), text)
+
+
+def others(module: str) -> str:
+    """What automodule leaves out of a module's public names: its constants, and what is loaded when it is asked for."""
+    names = importlib.import_module(module)
+    text = ""
+    for name in names.__all__:
+        thing = getattr(names, name)
+        if not (inspect.isclass(thing) or inspect.isroutine(thing)):
+            text += f"\n.. autodata:: {module}.{name}\n   :no-value:\n"
+        elif name not in vars(names):
+            text += f"\n.. autofunction:: {module}.{name}\n"
+    return text
 
 
 def docstring(app, what, name, thing, options, lines):

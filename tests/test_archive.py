@@ -80,12 +80,13 @@ def test_agents_of_the_main_experiment_are_kept(tmp_path):
     for name in ("main", "variant", "balanced"):
         (tmp_path / "runs" / name / "policy.pt").write_bytes(b"weights")
     archive.archive(tmp_path / "runs", tmp_path / "archive")
-    (kept,) = (tmp_path / "archive").rglob("policy.pt")
-    assert kept.parent.parent.name == "boreal-generalist-v0-vectorization=lockstep" and kept.read_bytes() == b"weights"
+    names = {"boreal-balanced-v0-vectorization=lockstep", "boreal-generalist-v0-vectorization=lockstep"}
+    kept = {path.parent.parent.name: path for path in (tmp_path / "archive").rglob("policy.pt")}
+    assert set(kept) == names and {path.read_bytes() for path in kept.values()} == {b"weights"}
     # trained again, by the same commit to the same configuration
     (tmp_path / "runs" / "main" / "policy.pt").write_bytes(b"others")
     archive.archive(tmp_path / "runs", tmp_path / "archive")
-    assert kept.read_bytes() == b"others"
+    assert kept["boreal-generalist-v0-vectorization=lockstep"].read_bytes() == b"others"
 
 
 def test_a_damaged_archive_is_named(archived):

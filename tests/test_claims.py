@@ -472,6 +472,7 @@ def test_the_committed_document_shows_the_committed_runs(tmp_path, monkeypatch):
 
 
 def test_without_runs_it_says_which_command_makes_them(tmp_path):
+    (tmp_path / "none").mkdir()
     claims.main(claims.Args(runs_dir=(tmp_path / "none",), output=tmp_path / "claims.md"))
     assert "No runs yet: `python analysis/reproduce.py --only main`" in (tmp_path / "claims.md").read_text()
 

@@ -12,20 +12,21 @@ import numpy as np
 import pytest
 
 import sim
-from sim import cuda
+from sim import cuda, stands
 from sim.state import DAYS, block_dtype
 
 MINUTES = 720
+stands.LONGEST_STEP_MINUTES = 1440  # in the process that simulates the GPU, too
 #: stands (of which some are lanes of a second block), days, whether the weather is observed
 CASES = {"three days of two blocks": (34, 3, False), "a year": (1, DAYS, False), "observed days": (2, 4, True)}
 
 
 def start(number):
-    stands = sim.Stands(number, time_step_minutes=MINUTES)
+    block = sim.Stands(number, time_step_minutes=MINUTES)
     fires = {"fire_base_probability": 0.05, "fire_drought_threshold": 0.0}
     sites = [sim.sample_site(k, fires) for k in range(number)]
-    stands.start(np.arange(number), sites, [sim.episode_seeds(k) for k in range(number)])
-    return stands
+    block.start(np.arange(number), sites, [sim.episode_seeds(k) for k in range(number)])
+    return block
 
 
 def compare(number, days, observed):

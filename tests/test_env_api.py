@@ -109,14 +109,15 @@ def test_the_passive_checker_has_nothing_to_say_but_that_rewards_are_vectors():
 
 
 def test_a_spawned_worker_needs_nothing_but_the_id():
-    make = partial(gym.make, "boreal_env:boreal-generalist-v0", **QUICK)
+    shorter = QUICK | {"time_step_minutes": 120}  # a new process allows no longer steps
+    make = partial(gym.make, "boreal_env:boreal-generalist-v0", **shorter)
     envs = AsyncVectorEnv([make], autoreset_mode=AutoresetMode.SAME_STEP, context="spawn")
     try:
         observations, _ = envs.reset(seed=3)
         stepped, rewards, *_ = envs.step(np.array([24]))
     finally:
         envs.close()
-    expected = play(quick(), [24], seed=3)
+    expected = play(quick(time_step_minutes=120), [24], seed=3)
     np.testing.assert_array_equal([observations[0], stepped[0]], expected[0])
     np.testing.assert_array_equal(rewards, expected[1])
 

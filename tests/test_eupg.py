@@ -194,8 +194,8 @@ def test_variable_lambda_learns_to_follow_the_preference(tmp_path, seed):
 
 
 def test_a_budget_without_room_for_a_batch_leaves_no_folder(tmp_path):
-    with pytest.raises(SystemExit, match="--total-timesteps 399 has no room for a batch.*400 steps"):
-        run_script("cleanrl_style/eupg_var_lambda.py", "--total-timesteps", 399, "--run-dir", tmp_path / "run")
+    with pytest.raises(SystemExit, match="--total-timesteps 49 has no room for a batch.*50 steps"):
+        run_script("cleanrl_style/eupg_var_lambda.py", "--total-timesteps", 49, "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 

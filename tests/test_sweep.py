@@ -105,7 +105,7 @@ def test_one_command_trains_all(tmp_path, monkeypatch):
     words = [
         "ppo_gated.py",
         "--seeds",
-        "1-2",
+        "1",
         "--address",
         "none",
         "--runs-dir",

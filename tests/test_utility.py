@@ -102,14 +102,14 @@ def test_where_it_is_not_defined_it_is_refused(tmp_path, script, flags, message)
 def test_an_ideal_point_is_asked_for_where_there_are_no_constant_plans(tmp_path):
     given = ("--env-id", "toy_env:toy-v0", "--run-dir", tmp_path / "run")
     with pytest.raises(SystemExit, match="--ideal-point: a return for each of carbon, thaw is needed"):
-        run_script("cleanrl_style/eupg_var_lambda.py", *given, "--scalarization", "chebyshev")
+        run_script("cleanrl_style/eupg_var_lambda.py", *given, "--scalarization", "chebyshev", "--utility", "total")
     with pytest.raises(SystemExit, match="--ideal-point is for --scalarization chebyshev"):
         run_script("cleanrl_style/eupg_var_lambda.py", *given, "--ideal-point", 10, 10)
 
 
 @pytest.mark.parametrize("script", ["ppo_gated", "eupg_fixed_lambda"])
 def test_a_run_logs_its_own_utility(tmp_path, script):
-    rollout = ("--rollout-steps", 20) if script == "ppo_gated" else ()
+    rollout = ("--rollout-steps", 20) if script == "ppo_gated" else ("--utility", "total")
     weights = ("--eval-weights", 0, 0.5) if script == "ppo_gated" else ("--preference", 0.3)
     run_script(
         f"cleanrl_style/{script}.py",

@@ -1,0 +1,137 @@
+"""How much a plan that is chosen for a site gains over one for all sites, and how much of that is luck of the dice.
+
+    python analysis/studies/site_choice.py      # three minutes on two idle cores
+
+The constant plans that are best anywhere are played on sampled sites, each with one first stand under several weathers
+and dice, the same for all plans. Three ways to choose: one plan for all sites; for each site the best one on the very
+dice that it is judged on, which no agent can know; and for each site the best one on all other dice, which an agent
+that knew the site to perfection could. Leaves results/studies/site_choice.csv, a row a task and weight, and weight
+"all", in which gains are scores: 100 is one plan for all sites, its own for each weight.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import boreal_env
+import sim
+from analysis import paths, stored
+from analysis.studies import open_loop
+from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts
+
+YEARS = 50
+SITES, DICE = 64, 8
+CHUNK = 128  # episodes in lockstep
+REPETITIONS = 1000  # of the bootstrap over sites
+PLANS = (boreal_env.NO_CHANGE, 20, 21, 22, 23, 24)  # nothing, and 100 stems a year of 0 to 100 % conifers
+ALL = "all"
+WAYS = ("all_sites", "same_dice", "other_dice")
+#: Task -> the simulator's arguments and the scale of its carbon reward.
+TASKS = {
+    "boreal-generalist-v0": ({}, boreal_env.Reward().carbon_scale),
+    "boreal-balanced-v0": (boreal_env.BALANCED_WORLD, boreal_env.BALANCED_CARBON_SCALE),
+}
+
+
+@dataclass
+class Args:
+    """Measures what knowing a site is worth."""
+
+    sites: int = SITES
+    """sampled sites"""
+    dice: int = DICE
+    """weathers and disturbances of each"""
+    quick: bool = False
+    """2 sites, 2 dice, 3 years: to see that it runs, into results/quick/studies"""
+
+
+def play(task: str, sites: int, dice: int, years: int, progress) -> np.ndarray:
+    """Gains over doing nothing of every plan, (plans, sites, dice, 2)."""
+    arguments, carbon_scale = TASKS[task]
+    design = [(site, die, plan) for site in range(sites) for die in range(dice) for plan in PLANS]
+    returns = []
+    for first in range(0, len(design), CHUNK):
+        part = design[first : first + CHUNK]
+        numbers = [open_loop.FIRST_SITE_SEED + site for site, _, _ in part]
+        episodes = open_loop.play(
+            [sim.sample_site(number) for number in numbers],
+            [open_loop.seeds(number, die) for number, (_, die, _) in zip(numbers, part, strict=True)],
+            np.repeat([[plan] for *_, plan in part], years, axis=1),
+            **arguments,
+        )
+        reward = boreal_env.Reward(carbon_scale=carbon_scale)
+        rewards = [
+            boreal_env.rewards_of_year(episodes.record[:, year], episodes.actions[:, year], reward, "asymmetric")
+            for year in range(years)
+        ]
+        returns.append(sum(np.column_stack([one["carbon_reward"], one["thaw_reward"]]) for one in rewards))
+        progress()
+    table = np.concatenate(returns).reshape(sites, dice, len(PLANS), 2).transpose(2, 0, 1, 3)
+    return table - table[:1]
+
+
+def chosen_gains(gains: np.ndarray, weight: float) -> np.ndarray:
+    """Scalarised gain of each site by each of WAYS, (3, sites); gains (plans, sites, dice, 2)."""
+    scalarised = weight * gains[..., 0] + (1 - weight) * gains[..., 1]
+    dice = scalarised.shape[2]
+    others = (scalarised.sum(axis=2, keepdims=True) - scalarised) / (dice - 1)
+    by_others = np.take_along_axis(scalarised, others.argmax(axis=0)[None], axis=0)[0]
+    best = scalarised.mean(axis=(1, 2)).argmax()
+    return np.stack([scalarised[best].mean(axis=1), scalarised.max(axis=0).mean(axis=1), by_others.mean(axis=1)])
+
+
+def summarise(task: str, gains: np.ndarray) -> list[dict]:
+    """Rows of a task: what each way of choosing gains, with 95 % intervals over sites."""
+    weights = fronts.evaluation_weights(2)
+    by_weight = np.stack([chosen_gains(gains, weight) for weight in weights])  # (weights, ways, sites)
+    resampled = np.random.default_rng(0).integers(gains.shape[1], size=(REPETITIONS, gains.shape[1]))
+    rows = []
+    for weight, table in [*zip(weights, by_weight, strict=True), (ALL, by_weight.mean(axis=0))]:
+        means, draws = table.mean(axis=1), table[:, resampled].mean(axis=2)
+        if weight == ALL:
+            means, draws = 100 * means / means[0], 100 * draws / draws[0]
+        row = {"task": task, "weight": weight}
+        for way, mean, drawn in zip(WAYS, means, draws, strict=True):
+            low, high = np.percentile(drawn, [2.5, 97.5])
+            row |= {way: mean, f"{way}_low": low, f"{way}_high": high}
+        # conifers less deciduous trees: what differs between sites, and between dice of a site
+        apart = gains[PLANS.index(24)] - gains[PLANS.index(20)]
+        apart = apart.mean(axis=2) if weight == ALL else weight * apart[..., 0] + (1 - weight) * apart[..., 1]
+        within = apart.var(axis=1, ddof=1).mean()
+        between = apart.mean(axis=1).var(ddof=1) - within / apart.shape[1]
+        row |= {"conifers_less_deciduous": apart.mean(), "sd_dice": np.sqrt(within), "sd_sites": max(between, 0) ** 0.5}
+        rows.append(row)
+    return rows
+
+
+def path(quick: bool = False) -> Path:
+    """The table."""
+    return paths.studies(quick) / "site_choice.csv"
+
+
+def main(args: Args) -> None:
+    """Play both tasks and write the table."""
+    sites, dice, years = (2, 2, 3) if args.quick else (args.sites, args.dice, YEARS)
+    if sites < 2 or dice < 2:
+        protocol.fail(f"--sites {sites} --dice {dice}: 2 or more of both are allowed")
+    made_by = {"sites": sites, "dice": dice, "years": years, "physics": open_loop.fingerprint()}
+    if stored.is_finished(path(args.quick), made_by):
+        print(f"{path(args.quick)} is finished")
+        return
+    chunks = -(-sites * dice * len(PLANS) // CHUNK) * len(TASKS)
+    progress, done = protocol.Progress("site_choice", chunks, "chunks"), iter(range(1, chunks + 1))
+    rows = [
+        row
+        for task in TASKS
+        for row in summarise(task, play(task, sites, dice, years, lambda: progress.show(next(done))))
+    ]
+    table = pd.DataFrame(rows)
+    stored.write(path(args.quick), table, made_by)
+    print(table[["task", "weight", *WAYS]].round(2).to_string(index=False) + f"\nwrote {path(args.quick)}")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))
