@@ -221,6 +221,7 @@ EXCERPTS = {
     "boreal_map": excerpts.boreal_map,
     "times": excerpts.times,
     "misses": excerpts.missing,
+    "knowing_the_site": excerpts.knowing_the_site,
 }
 
 

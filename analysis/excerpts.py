@@ -8,6 +8,7 @@ import pandas as pd
 
 from analysis import paths, stored
 from analysis.studies import boreal_map as region_map
+from analysis.studies import site_choice
 from cleanrl_style import protocol
 
 VALIDATION = Path("docs/validation.md")
@@ -109,6 +110,26 @@ def boreal_map() -> str:
     settings = stored.settings(path)
     answer = region_map.sentences(stored.read(path), settings["preference"], settings["years"])
     return f"![What the policy plants, and what that does](images/boreal_map.png)\n\n{answer}\n"
+
+
+def knowing_the_site() -> str:
+    """What choosing a plan by site is worth; results/studies/site_choice.csv has every weight."""
+    path = site_choice.path()
+    if not path.exists():
+        return "Not measured yet: `python analysis/studies/site_choice.py`.\n"
+    table = stored.read(path)
+    rows = []
+    for row in table[table.weight.astype(str) == site_choice.ALL].itertuples():
+        scores = [
+            f"{getattr(row, way):.0f} [{getattr(row, f'{way}_low'):.0f}, {getattr(row, f'{way}_high'):.0f}]"
+            for way in site_choice.WAYS[1:]
+        ]
+        thaw = table[(table.task == row.task) & (table.weight.astype(str) == "0.0")].iloc[0]
+        spread = [f"{thaw[name]:.2f}" for name in ("conifers_less_deciduous", "sd_sites", "sd_dice")]
+        rows.append([f"`{row.task}`", "100", *scores, *spread])
+    header = ["task", "one plan for all sites", "the best of each site, on the dice that judge it"]
+    header += ["the best of each site, on other dice", "conifers less deciduous, thaw", "its deviation between sites"]
+    return markdown([*header, "between dice of a site"], rows)
 
 
 def first_run() -> str:

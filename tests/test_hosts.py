@@ -13,9 +13,9 @@ from playing import QUICK, assert_same
 from cleanrl_style import protocol
 from cleanrl_style.protocol import training_envs
 
-gym.register("quick-v0", entry_point="boreal_env:BorealEnv", kwargs={**QUICK, "record_years": True})
+gym.register("hosted-v0", entry_point="boreal_env:BorealEnv", kwargs={**QUICK, "record_years": True})
 gym.register("limited-v0", entry_point="boreal_env:BorealEnv", kwargs=QUICK, max_episode_steps=2)
-TASK = protocol.Task.of("quick-v0")
+TASK = protocol.Task.of("hosted-v0")
 NUMBER = 8
 ACTIONS = np.random.default_rng(1).integers(0, 25, (10, NUMBER))
 
