@@ -18,7 +18,7 @@ from cleanrl_style.protocol.score import at_weights, best_constant_plans, by_wei
 from cleanrl_style.protocol.sites import evaluation_seeds
 from cleanrl_style.protocol.task import Task
 
-SHARES = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the training's steps, and at its end: all in all 2 % of a run's time, or less
+SHARES = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the training's steps, and at its end: all in all 9,000 years of stands
 STANDS = 30  # that are played: of two objectives 10 sites at 3 weights. They fill two blocks of the evaluation's kernel
 
 
