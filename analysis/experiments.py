@@ -310,6 +310,7 @@ def jobs(only=tuple(EXPERIMENTS), seeds: list[int] | None = None) -> list[Job]:
 # ------------------------------------------------------------------------------------------------- in small
 
 QUICK_STEPS = 1600  # an episode of each of 32 stands
+QUICK_STEPS_ALONE = 400  # of scripts that step one stand
 QUICK_EVALUATION = {"eval_episodes": 2, "eval_weights": (0.0, 0.5, 1.0)}
 
 
@@ -326,7 +327,9 @@ def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path | None = None) -> list[Jo
             small.append(Job(job.experiment, job.script, {"quick": True}))
             continue
         if job.steps:
-            flags["total_timesteps"] = QUICK_STEPS * job.steps // DEFAULT_STEPS[job.mode]
+            alone = job.script.startswith("eupg") and "num_envs" not in flags
+            steps = QUICK_STEPS_ALONE if alone else QUICK_STEPS
+            flags["total_timesteps"] = steps * job.steps // DEFAULT_STEPS[job.mode]
         flags |= QUICK_EVALUATION
         if "preference" in flags:
             del flags["eval_weights"]  # an agent of one weight is evaluated at it

@@ -50,7 +50,18 @@ def test_constant_plans_gain_there_what_they_gain():
     assert (one.marks["best"].scalarized_gain >= one.marks["plus_100"].scalarized_gain).all()
 
 
-def test_a_run_writes_draws_and_says_it(tmp_path, capsys):
+def test_a_short_training_has_none(tmp_path):
+    assert make(steps=300_000, episodes=200).fits and not make(steps=100, episodes=200).fits
+    run_script(
+        "cleanrl_style/ppo_gated.py",
+        *("--vectorization", "lockstep", "--num-envs", 4, "--rollout-steps", 200, "--total-timesteps", 200),
+        *("--eval-episodes", 1, "--eval-weights", 0, 1, "--update-epochs", 1, "--run-dir", tmp_path),
+    )
+    assert (tmp_path / "summary.png").exists() and not (tmp_path / "validation.csv").exists()
+
+
+def test_a_run_writes_draws_and_says_it(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(course, "LONGEST", np.inf)
     run_script(
         "cleanrl_style/ppo_gated.py",
         *("--vectorization", "lockstep", "--num-envs", 4, "--rollout-steps", 200, "--total-timesteps", 400),

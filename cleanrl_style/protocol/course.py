@@ -19,6 +19,7 @@ from cleanrl_style.protocol.sites import evaluation_seeds
 from cleanrl_style.protocol.task import Task
 
 SHARES = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the training's steps, and at its end: all in all 9,000 years of stands
+LONGEST = 0.2  # share of a training's steps that its course may take in years of stands; shorter trainings have none
 STANDS = 30  # that are played: of two objectives 10 sites at 3 weights. They fill two blocks of the evaluation's kernel
 
 
@@ -40,6 +41,12 @@ class Course:
         sites = 1 if one else min(STANDS // len(self.weights), episodes)
         self.seeds = evaluation_seeds(task, sites, "validation")
         self.columns = ("global_step", *weight_columns(task.objectives), *gain_columns(task.objectives))
+
+    @property
+    def fits(self) -> bool:
+        """Whether the training is long enough to be worth its course."""
+        years = (len(SHARES) + 1) * len(self.seeds) * len(self.weights) * self.task.years
+        return years <= LONGEST * self.steps
 
     @property
     def lanes(self) -> set[int]:

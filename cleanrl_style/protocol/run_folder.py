@@ -116,8 +116,9 @@ class Run:
             self._load_checkpoint()
             self.first_step = self.env_step = self.checkpoint_step  # of this process, so far
             if task.boreal and hasattr(args, "total_timesteps"):
-                self.course = Course(task, args.total_timesteps, args.eval_episodes, self.checkpoint_step)
-                tables = {**tables, "validation": self.course.columns}
+                course = Course(task, args.total_timesteps, args.eval_episodes, self.checkpoint_step)
+                if course.fits:
+                    self.course, tables = course, {**tables, "validation": course.columns}
             sizes = self.checkpoint["table_sizes"] if self.checkpoint else {}
             self.tables |= {
                 name: Table(self.folder / f"{name}.csv", columns, sizes.get(name, 0))
@@ -294,7 +295,7 @@ class Run:
         """At some shares of the training and at its end: what the greedy policy gains on the validation sites.
 
         policy : as for `evaluate`. Its gains go into validation.csv, its score into the progress line. Does nothing in
-        environments of which it is not known what doing nothing returns.
+        trainings too short for it, and in environments of which it is not known what doing nothing returns.
         """
         if self.course is None or not self.course.is_due(global_step, last):
             return
