@@ -153,7 +153,8 @@ def group(seeds) -> list[Job]:
         {"group_size": 1},
         {"group_size": 2},
         {"hide_site": True},
-        {"ent_coef": 0.01},
+        {"objective_logits": False},
+        {"ent_coef": 0.0},
         {"gae_lambda": (0.95,)},
         {"reward_scales": REWARD_SCALES},
     )

@@ -50,8 +50,10 @@ class Args:
     """passes over the rollout in an update"""
     clip_coef: float = 0.2
     """clipping of the policy's probability ratio"""
-    ent_coef: float = 0.0
-    """weight of the entropy bonus"""
+    ent_coef: float = 0.1
+    """weight of the entropy bonus at the start; it falls linearly to 0"""
+    objective_logits: bool = True
+    """each objective has logits of its own, which the preference weighs (no: one set for all)"""
     vf_coef: float = 0.5
     """weight of the value loss"""
     max_grad_norm: float = 0.5
@@ -94,9 +96,12 @@ def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
 
 
 class Agent(nn.Module):
-    """A gate chooses planting (actions 15-24) or not (0-14); each has its own head."""
+    """A gate chooses planting (actions 15-24) or not (0-14); each has its own head, and each objective its own three.
 
-    def __init__(self, envs, num_values=2):
+    The preference weighs the objectives' logits, as it does their advantages. num_logits : one for each, or 1 for all.
+    """
+
+    def __init__(self, envs, num_values=2, num_logits=2):
         super().__init__()
         observation_dim = np.array(envs.single_observation_space.shape).prod()
         self.critic = nn.Sequential(
@@ -111,7 +116,8 @@ class Agent(nn.Module):
             nn.Tanh(),
             layer_init(nn.Linear(64, 64)),
             nn.Tanh(),
-            layer_init(nn.Linear(64, 2 + 15 + 10), std=0.01),  # gate, head of other actions, head of planting
+            layer_init(nn.Linear(64, num_logits * (2 + 15 + 10)), std=0.01),
+            nn.Unflatten(1, (num_logits, 2 + 15 + 10)),  # gate, head of other actions, head of planting
         )
 
         # of what the first rollout observed, and of returns: networks get and give numbers of mean 0 and deviation 1
@@ -131,8 +137,12 @@ class Agent(nn.Module):
         At least one action is valid in each row. Written out, since torch's Categorical takes longer than its networks.
         """
         sides = torch.stack([mask[:, :15].any(dim=1), mask[:, 15:].any(dim=1)], dim=1)
+        logits = self.actor(self.normalize(x))
+        weights = x[:, : logits.shape[1] - 1]  # the last one's is what they leave
+        weights = torch.cat([weights, 1.0 - weights.sum(dim=1, keepdim=True)], dim=1)
+        logits = (weights[:, :, None] * logits).sum(dim=1)
         # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in a side without a valid action
-        logits = torch.where(torch.cat([sides, mask], dim=1), self.actor(self.normalize(x)), -1e8)
+        logits = torch.where(torch.cat([sides, mask], dim=1), logits, -1e8)
         gate, other, plant = (part.log_softmax(dim=1) for part in logits.split([2, 15, 10], dim=1))
         return torch.cat([gate[:, :1] + other, gate[:, 1:] + plant], dim=1)
 
@@ -263,7 +273,8 @@ if __name__ == "__main__":
         envs = run.make_envs()
 
         num_values = task.num_objectives
-        agent = Agent(envs, num_values)
+        num_logits = num_values if args.objective_logits else 1
+        agent = Agent(envs, num_values, num_logits)
         parameters = protocol.flat_parameters(agent)
         optimizer = optim.Adam([parameters], lr=args.learning_rate, eps=1e-5, fused=True)
 
@@ -289,7 +300,8 @@ if __name__ == "__main__":
         progress = run.progress(steps_per_env * args.num_envs, global_step)
 
         for iteration in range(first_iteration, num_iterations + 1):
-            optimizer.param_groups[0]["lr"] = args.learning_rate * (1.0 - (iteration - 1.0) / num_iterations)
+            remaining = 1.0 - (iteration - 1.0) / num_iterations
+            optimizer.param_groups[0]["lr"], ent_coef = args.learning_rate * remaining, args.ent_coef * remaining
             # ALGO Logic: Storage setup (the last rollout may be shorter)
             num_steps = min(rollout_length, steps_per_env - global_step // args.num_envs)
             obs = torch.zeros((num_steps, args.num_envs) + envs.single_observation_space.shape)
@@ -393,7 +405,7 @@ if __name__ == "__main__":
                 for minibatch in range(num_minibatches):
                     parts = ppo_losses(agent, *(part[minibatch::num_minibatches] for part in shuffled), args)
                     pg_loss, v_loss, entropy = parts[:3]
-                    loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
+                    loss = pg_loss - ent_coef * entropy + args.vf_coef * v_loss
 
                     optimizer.zero_grad(set_to_none=False)
                     loss.backward()
@@ -426,7 +438,7 @@ if __name__ == "__main__":
             run.save(global_step, last, **state)
 
         envs.close()
-        run.save_policy(agent, num_values=num_values)
+        run.save_policy(agent, num_values=num_values, num_logits=num_logits)
 
         evaluation_start = time.perf_counter()
         evaluation, years = protocol.evaluate(task, make_policy(agent), args.eval_weights, args.eval_episodes)

