@@ -97,6 +97,8 @@ def test_the_table_in_euros_over_bark_by_hand():
     canada = read_prices("canada")
     dues = canada["sawlog_conifer"] - canada["harvesting"] - canada["roads"]
     assert dues == pytest.approx(12.32 * 0.88 / 1.4855)  # what Quebec asks for its trees
+    royalty = canada["pulpwood_conifer"] - canada["harvesting"] - canada["roads"]
+    assert royalty == pytest.approx(7.59 * 0.88 / 1.4855)  # what New Brunswick asked
     assert read_prices("finland")["harvesting"] == 0.0  # sold standing
 
 

@@ -49,7 +49,8 @@ def open_ground(year: dict[str, np.ndarray]) -> np.ndarray:
     return np.interp(1.0 - year["crown_cover"], [0.0, *GAPS, NO_FOREST], [0.0, 1.0, 1.0, 0.0])
 
 
-#: What "biodiversity" counts the index in: its return then varies between plans as those of carbon and thaw do.
+#: What "biodiversity" counts the index in: its return then varies between plans as those of carbon and thaw do, which
+#: `analysis/studies/objective_scales.py` measures.
 BIODIVERSITY_SCALE = 4.0
 
 
