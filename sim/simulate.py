@@ -1,11 +1,9 @@
 """The scientist's door: one stand, given actions, generated or observed weather, a table or a Dataset out."""
 
-import sys
 
 import numpy as np
 import pandas as pd
 
-from sim.block import is_compiled
 from sim.draws import episode_seeds
 from sim.io.check import check_forcing, interval_of
 from sim.io.dataset import import_xarray, to_dataset
@@ -145,8 +143,6 @@ def simulate(
         place = _with_leaf_area(place, lai, stand, seeds, stocks)
     if hold_stand and decode(per_year)[0].any():
         raise ValueError("hold_stand: a stand that is held is neither planted nor cut; actions=None is allowed")
-    if backend == "numba" and not is_compiled(stand.lanes):
-        print("compiling the simulator, once for this processor: about a minute", file=sys.stderr, flush=True)
     stand.start(0, [place], [seeds], {0: stocks}, observed=first_weather)
 
     held = stand.state[:, HELD_COLUMNS].copy()

@@ -589,14 +589,6 @@ def test_a_step_of_more_than_two_hours_is_refused():
     assert result.stderr.splitlines()[-1] == message
 
 
-def test_the_first_run_says_that_it_compiles(monkeypatch, capsys):
-    simulate()
-    assert capsys.readouterr().err == ""
-    monkeypatch.setattr(sys.modules["sim.simulate"], "is_compiled", lambda lanes: False)
-    simulate()
-    assert capsys.readouterr().err == "compiling the simulator, once for this processor: about a minute\n"
-
-
 # ------------------------------------------------------------------------------------------------------ refusals
 
 BAD = {
