@@ -154,6 +154,7 @@ def group(seeds) -> list[Job]:
         {"group_size": 2},
         {"hide_site": True},
         {"objective_logits": False},
+        {"relabelings": 0},
         {"ent_coef": 0.0},
         {"gae_lambda": (0.95,)},
         {"reward_scales": REWARD_SCALES},

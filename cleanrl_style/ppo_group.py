@@ -44,8 +44,10 @@ class Args:
     """discount factor"""
     gae_lambda: tuple[float, ...] | None = None
     """lambda of generalised advantage estimation, one or one for each objective (None: 0.95, and 1 for thaw)"""
+    relabelings: int = 3
+    """how often a rollout is learned from once more, as if its stands had had other preferences"""
     minibatch_size: int = 640
-    """largest number of transitions in a minibatch"""
+    """largest number of transitions in a minibatch, not counting what is relabelled"""
     update_epochs: int = 5
     """passes over the rollout in an update"""
     clip_coef: float = 0.2
@@ -219,8 +221,29 @@ def spread_preferences(num_groups, group_size, num_objectives):
     return weights.reshape(-1, num_objectives - 1)
 
 
-def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
-    """Policy loss, value loss, entropy, two estimates of the KL divergence and clip fraction of a minibatch."""
+def relabel(agent, obs, masks, actions, logprobs, advantages):
+    """Observations, log-probabilities and weighed advantages of a rollout whose stands have other preferences, flat.
+
+    What an action adds to each objective does not hang on the preference, but for the policy that follows. An advantage
+    counts by how much more likely its action is under the new preference, at most twice.
+    """
+    preferences = spread_preferences(obs.shape[1], 1, advantages.shape[2])
+    obs = obs.clone()
+    obs[:, :, : preferences.shape[1]] = torch.from_numpy(preferences)
+    weights = np.column_stack([preferences, 1.0 - preferences.sum(axis=1)])
+    weights = torch.from_numpy(weights).float().expand(len(obs), -1, -1).flatten(0, 1)
+    obs = obs.flatten(0, 1)
+    with torch.no_grad():
+        new_logprobs = agent.get_logprobs(obs, masks.flatten(0, 1)).gather(1, actions.flatten()[:, None]).squeeze(1)
+    ratio = (new_logprobs - logprobs.flatten()).exp().clamp(max=2.0)
+    return obs, new_logprobs, ratio * weigh_advantages(advantages.flatten(0, 1), weights)
+
+
+def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, own, args):
+    """Policy loss, value loss, entropy, two estimates of the KL divergence and clip fraction of a minibatch.
+
+    own : 1 where the preference is that of the episode, 0 where it is not and the value is not learned from.
+    """
     _, logprob, entropy, value = agent.get_action_and_value(x, mask, action)
     logratio = logprob - old_logprob
     ratio = logratio.exp()
@@ -231,7 +254,8 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
     pg_loss = torch.max(pg_loss1, pg_loss2).mean()
 
     # Value loss
-    v_loss = 0.5 * (((value - target) / agent.value_std) ** 2).mean()
+    v_loss = 0.5 * (((value - target) / agent.value_std) ** 2).mean(dim=1)
+    v_loss = (v_loss * own).sum() / own.sum().clamp(min=1.0)
 
     with torch.no_grad():
         # http://joschu.net/blog/kl-approx.html
@@ -247,6 +271,8 @@ if __name__ == "__main__":
     episode_columns = task.episode_columns
     if args.group_size < 1 or args.num_envs % args.group_size:
         protocol.fail(f"--group-size {args.group_size}: a divisor of --num-envs {args.num_envs} is allowed")
+    if args.relabelings < 0:
+        protocol.fail(f"--relabelings {args.relabelings}: 0 or more is allowed")
     gae_lambda = args.gae_lambda or [1.0 if name == "thaw" else 0.95 for name in task.objectives]
     if len(gae_lambda) not in (1, task.num_objectives):
         protocol.fail(f"--gae-lambda: 1 number or {task.num_objectives} are allowed, not {len(gae_lambda)}")
@@ -388,17 +414,23 @@ if __name__ == "__main__":
             b_masks = masks.flatten(0, 1)
             b_logprobs = logprobs.flatten()
             b_actions = actions.flatten()
-            b_advantages = advantages.flatten(0, 1)
+            b_advantages = weigh_advantages(advantages.flatten(0, 1), weights.flatten(0, 1))
             b_returns = returns.flatten(0, 1)
             b_values = values.flatten(0, 1)
-            b_inds = np.arange(num_steps * args.num_envs)
+
+            # once more under other preferences
+            batches = [(b_obs, b_masks, b_actions, b_logprobs, b_advantages, b_returns, torch.ones(len(b_obs)))]
+            for _ in range(args.relabelings):
+                new_obs, new_logprobs, new_advantages = relabel(agent, obs, masks, actions, logprobs, advantages)
+                other = torch.zeros(len(b_obs))
+                batches.append((new_obs, b_masks, b_actions, new_logprobs, new_advantages, b_returns, other))
+            batch = [torch.cat(parts) for parts in zip(*batches, strict=True)]
+            b_inds = np.arange(len(batch[0]))
 
             # Optimizing the policy and value network
-            b_advantages = weigh_advantages(b_advantages, weights.flatten(0, 1))
-            num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
-            batch = (b_obs, b_masks, b_actions, b_logprobs, b_advantages, b_returns)
+            num_minibatches = math.ceil(len(b_obs) / args.minibatch_size)
             losses = []
-            y_pred, y_true = b_values[b_inds], b_returns[b_inds]
+            y_pred, y_true = b_values, b_returns
             for epoch in range(args.update_epochs):
                 np.random.shuffle(b_inds)
                 shuffled = [part[b_inds] for part in batch]

@@ -1,6 +1,5 @@
 """The scientist's door: one stand, given actions, generated or observed weather, a table or a Dataset out."""
 
-
 import numpy as np
 import pandas as pd
 
