@@ -501,7 +501,7 @@ def test_a_table_without_numbers_is_named_and_removed(tmp_path, capsys):
 
 def test_every_table_and_figure_names_its_command():
     for module in (*make_tables.TABLES, *make_figures.FIGURES):
-        for command in module.MADE_BY.split("; "):
+        for command in module.MADE_BY.split(" && "):
             script, *words = command.removeprefix("python ").split(" --only ")
             assert (ROOT / script).exists() and {*" ".join(words).split()} <= {*experiments.EXPERIMENTS}, module
 
