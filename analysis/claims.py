@@ -156,7 +156,7 @@ def section(claim: Claim, found: Finding, numbers: dict[Claim, int]) -> str:
         f"{claim.where}. {claim.kind[0].upper()}{claim.kind[1:]}. **{found.verdict[0].upper()}{found.verdict[1:]}.**",
     ]
     if found.verdict == NO_RUNS:
-        return "\n".join([*head, "", f"No runs yet: `{claim.command}` ({found.rule} is lacking)", ""])
+        return "\n".join([*head, "", f"Not run yet: `{claim.command}` ({found.rule} is lacking)", ""])
     source = f"`{claim.command}`" if claim.command else "From the paper and this project's tables alone."
     words = " ".join(explanation(claim, found, numbers))
     return "\n".join([*head, "", *table(found.rows), "", *([words, ""] if words else []), source, ""])

@@ -8,6 +8,7 @@ is made here, so that no page shows a number that was not measured.
 
 import re
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,9 +17,11 @@ import pandas as pd
 
 from analysis import excerpts, experiments, main_points, methods, metrics, paths
 from analysis.experiments import BALANCED, GENERALIST
+from analysis.figures import learning_asymmetry, learning_curves, learning_difficulty
 from analysis.results import Results
 from analysis.tables import distance_to_best, main_results, runtime, single_sites
-from analysis.tables.common import over_seeds
+from analysis.tables import learning_difficulty as difficulty_table
+from analysis.tables.common import has_numbers, over_seeds, readable
 from cleanrl_style import protocol
 
 PAGES = (
@@ -80,8 +83,36 @@ def line(title: str, replicates: list, published: float = np.nan, trained: bool 
         interval = "" if np.isnan(low) else f" [{low:.{decimals}f}, {high:.{decimals}f}]"
         cells.append("" if np.isnan(value) else f"{value:.{decimals}f}{interval}")
     cells.append("" if np.isnan(published) else f"{published:.2f}")
-    seeds = str(len(table)) if trained else ""
+    seeds = str(len(table) or "not run yet") if trained else ""
     return f"| {title} | {seeds} | " + " | ".join(cells) + " |\n"
+
+
+def not_run(*names: str) -> str:
+    """What stands where runs of experiments are missing."""
+    return f"Not run yet: `python analysis/reproduce.py --only {' '.join(names)}`.\n"
+
+
+def experiments_of(script: str) -> list[str]:
+    """The experiments that a script has jobs in."""
+    return list(dict.fromkeys(job.experiment for job in experiments.jobs() if job.script == script))
+
+
+def has_default(rows: list[tuple], script: str) -> bool:
+    """Whether a script's row without flags is among rows."""
+    return any(row[0] == methods.title(script) for row in rows)
+
+
+def figure_of(name: str) -> Callable[[Results], str]:
+    """Makes the section with a figure of results/figures, or with the command that makes its runs."""
+    module, shown = FIGURES[name]
+
+    def section_of_figure(results: Results) -> str:
+        path = paths.results() / "figures" / f"{name}.png"
+        if path.exists():
+            return f"![{shown}](../{path.as_posix()})\n"
+        return f"Not run yet: `{module.MADE_BY}` (a figure: {shown}).\n"
+
+    return section_of_figure
 
 
 def flags(setting: str) -> str:
@@ -132,7 +163,7 @@ def distances(results: Results) -> str:
     """How near agents and fixed strategies come to the best known plans of the fronts' sites, in whole percent."""
     table = distance_to_best.make(results)
     if not table.seeds.any():
-        return "Not played yet.\n"
+        return not_run("difficulty")
     shares = [f"share_{weight:g}" for weight in experiments.WEIGHTS] + ["hypervolume"]
     text = (
         "| % of the best known gain at carbon weight | seeds | "
@@ -152,11 +183,22 @@ def distances(results: Results) -> str:
     return text
 
 
+def difficulty(results: Results) -> str:
+    """What the returns vary with, effects of actions against their noise, and how much of a gradient is noise."""
+    table = difficulty_table.make(results)
+    if not has_numbers(table, difficulty_table.COLUMNS):
+        return f"Not run yet: `{difficulty_table.MADE_BY}`.\n"
+    text = readable(table, difficulty_table.COLUMNS)
+    return excerpts.markdown(list(text), text.to_numpy().tolist())
+
+
 def sites_alone(results: Results) -> str:
     """Gains of agents of one objective on each of the single sites, and of the best constant plan there."""
-    columns = single_sites.COLUMNS
+    columns, table = single_sites.COLUMNS, single_sites.make(results)
+    if not has_numbers(table, columns):
+        return not_run("main", "site")
     text = "| " + " | ".join(columns.values()) + " |\n" + "|---" * len(columns) + "|\n"
-    for _, (site, *gains) in single_sites.make(results)[list(columns)].iterrows():
+    for _, (site, *gains) in table[list(columns)].iterrows():
         text += "| " + " | ".join([site, *("" if np.isnan(gain) else f"{gain:.2f}" for gain in gains)]) + " |\n"
     return text
 
@@ -177,7 +219,7 @@ def other_libraries(results: Results) -> str:
         cells += ["" if np.isnan(x) else f"{x:.{digits}f}" for x, digits in zip(shown, (0, 0, 2), strict=True)]
         cells += [f"{hours:.1f}", f"{cost.peak_memory_mb / 1000:.1f}", f"{cost.steps:,.0f}"]
         text += "| " + " | ".join([*cells, f"{cost.own_evaluation_steps:,.0f}"]) + " |\n"
-    return text if rows else "No runs yet.\n"
+    return text if rows else not_run("outside")
 
 
 def section(results: Results, name: str) -> str:
@@ -199,11 +241,26 @@ def section(results: Results, name: str) -> str:
     if name in OF_ALL or name == "heuristics":
         rows += plans(results, OF_ALL.get(name, GENERALIST))
     if not rows:
-        return "No runs yet.\n"
+        return not_run(*EXPERIMENTS_OF.get(name, experiments_of(name)))
+    if name in OF_ALL:
+        missing = [script for script in (*methods.LEARNERS, *methods.STRATEGIES) if not has_default(rows, script)]
+        rows += [(methods.title(script), [], np.nan, True) for script in missing]
     what = "method" if name in OF_ALL or name == "heuristics" else "flags"
     return HEADING.format(what=what) + "".join(line(*row) for row in rows)
 
 
+EXPERIMENTS_OF = {"all": ["main"], "balanced": ["balanced"], "heuristics": ["main", "balanced"]}
+FIGURES = {
+    "learning_curves": (learning_curves, "Returns and gains in training, against fixed strategies"),
+    "learning_asymmetry": (
+        learning_asymmetry,
+        "EUPG of one weight: returns and gains in training; panel f: single sites, with a baseline and without",
+    ),
+    "learning_difficulty": (
+        learning_difficulty,
+        "Shares of the variance; effect and noise; course of the effect; episodes needed",
+    ),
+}
 OF_ALL = {"all": GENERALIST, "balanced": BALANCED}
 TABLES = {
     "distances": distances,
@@ -211,6 +268,8 @@ TABLES = {
     "six_rows": main_points.six_rows,
     "in_words": main_points.in_words,
     "outside": other_libraries,
+    "difficulty": difficulty,
+    **{f"figure_{name}": figure_of(name) for name in FIGURES},
 }
 EXCERPTS = {
     "speed": excerpts.speed,

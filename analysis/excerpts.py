@@ -116,7 +116,7 @@ def knowing_the_site() -> str:
     """What choosing a plan by site is worth; results/studies/site_choice.csv has every weight."""
     path = site_choice.path()
     if not path.exists():
-        return "Not measured yet: `python analysis/studies/site_choice.py`.\n"
+        return "Not run yet: `python analysis/studies/site_choice.py`.\n"
     table = stored.read(path)
     rows = []
     for row in table[table.weight.astype(str) == site_choice.ALL].itertuples():
@@ -134,7 +134,10 @@ def knowing_the_site() -> str:
 
 def first_run() -> str:
     """The end of what the first run printed."""
-    text = (paths.results() / "first_run.txt").read_text(encoding="utf-8")
+    path = paths.results() / "first_run.txt"
+    if not path.exists():
+        return "*Not run yet: `python analysis/follow_readme.py` runs it, and puts its end here.*\n"
+    text = path.read_text(encoding="utf-8")
     return f"```text\n{text[text.index('SCORE') :].rstrip()}\n```\n"
 
 

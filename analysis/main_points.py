@@ -6,6 +6,7 @@ import numpy as np
 
 from analysis import methods
 from analysis.experiments import BALANCED, GENERALIST
+from analysis.paper_claims.claim import FEWEST_SEEDS
 from analysis.tables import main_results
 
 WORLDS = (BALANCED, GENERALIST)
@@ -13,6 +14,7 @@ BEST_PLAN = "best_constant_mix"
 PLANTING = "plus_100"
 SIX = (PLANTING, "eupg_var_lambda", "ppo_gated", "ppo_curriculum", "ppo_group")
 """Rows of the README, between doing nothing, which is 0, and the best constant plans."""
+NOT_RUN = "Not run yet: `python analysis/reproduce.py --only main balanced`.\n"
 
 
 def default_rows(results, env_id: str) -> dict[str, list]:
@@ -55,7 +57,7 @@ def six_rows(results) -> str:
 def in_words(results) -> str:
     """A paragraph for each world: who is ahead, and whether the preference is followed."""
     paragraphs = [paragraph(results, env_id) for env_id in WORLDS]
-    return "".join(paragraphs) or "No runs yet.\n"
+    return "".join(paragraphs) or NOT_RUN
 
 
 def paragraph(results, env_id: str) -> str:
@@ -71,21 +73,42 @@ def paragraph(results, env_id: str) -> str:
     beat = [script for script in trained if known[script] > 100.0]
     text = (
         f"- **`{env_id}`.** Planting 100 stems a year without looking scores {known[PLANTING]:.0f}. The best of "
-        f"{len(trained)} trained methods is {methods.title(best)} with {shown(scores[best])}; "
+        f"{len(trained)} trained method{'s' if len(trained) > 1 else ''} is {methods.title(best)} with "
+        f"{shown(scores[best])}, {of_seeds(rows[best])}; "
         f"{named(above)} above planting, {named(beat)} above 100."
     )
+    lacking = [methods.title(script) for script in methods.LEARNERS if script not in known]
+    text += f" Not run yet: {listed(lacking)}." if lacking else ""
     followed = {
         script: main_results.row_of_runs((script, env_id, "default"), rows[script])
         for script in trained
-        if script in methods.LEARNERS
+        if script in methods.LEARNERS and len(rows[script]) >= FEWEST_SEEDS
     }
+    if not followed:
+        text += f" Whether a method follows the preference is said from {FEWEST_SEEDS} training seeds on."
+        return wrapped(text)
     carbon = [script for script, row in followed.items() if row["carbon_change_low"] > 0.0]
     thaw = [script for script, row in followed.items() if row["thaw_change_high"] < 0.0]
     text += (
         f" Asked for carbon instead of thaw, {named(carbon, 'store')} more carbon for it; asked for thaw instead of "
         f"carbon, {named(thaw, 'keep')} more cold in the ground (intervals over training seeds without 0)."
     )
+    return wrapped(text)
+
+
+def wrapped(text: str) -> str:
+    """A point of a list, as the documents' lines are."""
     return textwrap.fill(text, 120, subsequent_indent="  ", break_on_hyphens=False) + "\n"
+
+
+def of_seeds(replicates: list) -> str:
+    """How many trainings a row has."""
+    return f"{len(replicates)} training seed{'s' if len(replicates) > 1 else ''}"
+
+
+def listed(titles: list[str]) -> str:
+    """Titles in a sentence."""
+    return titles[0] if len(titles) == 1 else ", ".join(titles[:-1]) + f" and {titles[-1]}"
 
 
 def named(scripts: list[str], verb: str = "") -> str:
@@ -93,6 +116,6 @@ def named(scripts: list[str], verb: str = "") -> str:
     if not scripts:
         return "none " + (f"{verb}s" if verb else "is")
     titles = [methods.title(script) for script in scripts]
-    words = titles[0] if len(titles) == 1 else ", ".join(titles[:-1]) + f" and {titles[-1]}"
+    words = listed(titles)
     plural = len(titles) > 1
     return f"{words} " + ((verb if plural else f"{verb}s") if verb else ("are" if plural else "is"))

@@ -4,7 +4,8 @@
 
 Those of results/figures are of the project's runs alone; `reproduce.py` makes them.
 
-A panel without runs says which command makes them.
+A panel without runs says which command makes them. A figure without any is not drawn, and what an earlier call left of
+it is removed.
 """
 
 import sys
@@ -30,8 +31,8 @@ from analysis.figures import (
     trade_off_coverage,
     training_dynamics,
 )
-from analysis.figures.common import STYLE, save
-from analysis.make_tables import name_of
+from analysis.figures.common import STYLE, remove, save
+from analysis.make_tables import name_of, say_what_was_not_run
 from analysis.results import Results
 from cleanrl_style import protocol
 
@@ -82,10 +83,18 @@ def main(args: Args) -> None:
     folder = args.figures_dir or paths.runs(args.quick) / "figures"
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        not_run = []
         for module in FIGURES:
+            figure = draw(module, results)
+            if not any(ax.has_data() for ax in figure.get_axes()):
+                remove(folder / name_of(module))
+                not_run.append(f"{name_of(module)}: {module.MADE_BY}")
+                continue
             with matplotlib.rc_context(STYLE):
-                save(draw(module, results), folder / name_of(module))
+                save(figure, folder / name_of(module))
         others = many_objectives.figures(results)
+        for path in set(folder.glob(f"{many_objectives.STEM}_*.png")) - {folder / f"{name}.png" for name in others}:
+            remove(path)
         for name, (size, drawing) in others.items():
             with matplotlib.rc_context(STYLE):
                 figure = Figure(figsize=size, layout="constrained")
@@ -94,7 +103,8 @@ def main(args: Args) -> None:
                 save(figure, folder / name)
     except OSError as error:
         sys.exit(f"error: --figures-dir {folder}: cannot write there ({error.strerror})")
-    print(f"{len(FIGURES) + len(others)} figures: {folder}/*.png, *.pdf")
+    say_what_was_not_run("figures", not_run)
+    print(f"{len(FIGURES) - len(not_run) + len(others)} figures: {folder}/*.png, *.pdf")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@
 
 Those of results/tables are of the project's runs alone; `reproduce.py` makes them.
 
+A table without a number of ours is not written, and what an earlier call left of it is removed.
+
 Runs are recognised by their config.json, never by the name of their folder. Runs of one script that differ only in
 the seed form one row: the metrics are computed for each run, then aggregated over training seeds (interquartile mean,
 95 % bootstrap interval). The main table has the score of the greedy and of the sampled policy; all other numbers are of
@@ -34,7 +36,7 @@ from analysis.tables import (
     thaw_formulations,
     warming_flux,
 )
-from analysis.tables.common import readable, write_table
+from analysis.tables.common import has_numbers, readable, remove_table, write_table
 from cleanrl_style import protocol
 
 TABLES = (
@@ -89,6 +91,13 @@ def say_what_is_missing(results: Results) -> None:
         print(f"No script yet for {', '.join(without_script)}.")
 
 
+def say_what_was_not_run(what: str, lines: list[str]) -> None:
+    """Print the tables or figures that have no data, with their commands."""
+    if lines:
+        print(f"\nNot run yet, so these {what} are not there:")
+        print("\n".join(f"  {line}" for line in lines))
+
+
 def main(args: Args) -> None:
     """Write every table; print the main one, and what was left out or is missing."""
     results = Results.load(args.quick, args.runs_dir)
@@ -101,14 +110,22 @@ def main(args: Args) -> None:
     folder = args.tables_dir or paths.runs(args.quick) / "tables"
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        not_run = []
         for module in TABLES:
             table = module.make(results)
+            if not has_numbers(table, module.COLUMNS):
+                remove_table(folder / name_of(module))
+                not_run.append(f"{name_of(module)}: {module.MADE_BY}")
+                continue
             text = readable(table, module.COLUMNS)
             write_table(folder / name_of(module), table, text)
             if module is main_results:
                 print(f"{EXPLANATION}\n")
                 print(text[list(main_results.TERMINAL)].to_string(index=False))
         others = many_objectives.make(results)
+        for stem in many_objectives.STEMS:
+            for path in set(folder.glob(f"{stem}_*.csv")) - {folder / f"{name}.csv" for name in others}:
+                remove_table(path)
         for name, (table, columns) in others.items():
             write_table(folder / name, table, readable(table, columns))
     except OSError as error:
@@ -116,7 +133,8 @@ def main(args: Args) -> None:
     say_what_is_missing(results)
     if any(one.gains is None for replicates in rows.values() for one in replicates):
         print("Gains need a run of baselines_heuristic/zero_change.py in the same environment, as long.")
-    print(f"\n{len(TABLES) + len(others)} tables with all columns: {folder}/*.csv, *.md, *.tex")
+    say_what_was_not_run("tables", not_run)
+    print(f"\n{len(TABLES) - len(not_run) + len(others)} tables with all columns: {folder}/*.csv, *.md, *.tex")
 
 
 if __name__ == "__main__":

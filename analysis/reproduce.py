@@ -2,6 +2,7 @@
 
     python analysis/reproduce.py                     everything, the main table first; the same command goes on
     python analysis/reproduce.py --only main thaw    some of analysis/experiments.py's groups
+    python analysis/reproduce.py --only main balanced --untrained    the fixed strategies and constant plans alone
     python analysis/reproduce.py --quick             every kind of experiment in small, in a few minutes
     python analysis/reproduce.py --list              the commands, without running them
 
@@ -40,6 +41,8 @@ class Args:
 
     only: tuple[Experiment, ...] = tuple(experiments.EXPERIMENTS)
     """which experiments"""
+    untrained: bool = False
+    """only what trains nothing and reads no training: fixed strategies, constant plans, studies of the simulator"""
     seeds: tuple[int, ...] | None = None
     """which training seeds (None: all that an experiment has)"""
     quick: bool = False
@@ -79,6 +82,8 @@ def main(args: Args) -> None:
     """Run what is not finished, archive it, and make tables, figures and the documents that show results."""
     seeds = None if args.seeds is None else list(args.seeds)
     jobs = experiments.quick_jobs(args.only) if args.quick else experiments.jobs(args.only, seeds)
+    if args.untrained:
+        jobs = [job for job in jobs if not job.trains and not job.waits]
     if args.list:
         print("\n".join(job.command for job in jobs))
         return

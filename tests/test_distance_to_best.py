@@ -255,4 +255,4 @@ def test_the_table_of_shares(fronts_dir, calls, tmp_path):
     assert alone.loc[("ppo_gated", "default", "greedy")].seeds == 2
     assert table.loc[("zero_change", "", "sampled", "2, all"), "share_1"] == pytest.approx(100 / 3)
     missing = share_table.make(Results((tmp_path / "runs",), experiments.jobs(), tmp_path / "no studies"))
-    assert missing.method.tolist() == ["not played yet"]
+    assert missing.method.tolist() == ["not run yet"]

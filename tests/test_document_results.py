@@ -1,10 +1,11 @@
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 from tiny_runs import TINY_RUNS, write_run
 
-from analysis import document_results, experiments
+from analysis import document_results, experiments, main_points, methods
 from analysis.results import Results
 
 ROOT = Path(__file__).parents[1]
@@ -57,12 +58,39 @@ def test_rows_are_those_of_the_runs(tmp_path):
 
 def test_all_methods_and_the_heuristics(tmp_path):
     results = Results((TINY_RUNS,), experiments.jobs(), tmp_path)
+    every = (*methods.LEARNERS, *methods.STRATEGIES)
+    lacking = [script for script in every if script not in ("ppo_curriculum", "zero_change")]
     assert [row.split(" | ")[0] for row in document_results.section(results, "all").splitlines()[2:]] == [
         "| Curriculum PPO",
         "| Zero change",
+        *(f"| {methods.title(script)}" for script in lacking),
     ]
+    last = document_results.section(results, "all").splitlines()[-1]
+    assert last.startswith("| Random | not run yet |") and not re.search(r"\d", last)
     assert len(document_results.section(results, "heuristics").splitlines()) == 3
-    assert document_results.section(results, "eupg_var_lambda") == "No runs yet.\n"
+    assert document_results.section(results, "eupg_var_lambda") == (
+        "Not run yet: `python analysis/reproduce.py --only main balanced variants`.\n"
+    )
+
+
+def test_every_section_without_runs_names_a_command(tmp_path, monkeypatch):
+    """But for those of what needs no run: speed, towers, the site's worth and what misses."""
+    texts = [(ROOT / page).read_text(encoding="utf-8") for page in document_results.PAGES]
+    monkeypatch.chdir(tmp_path)
+    results = Results((), experiments.jobs(), tmp_path / "none")
+    names = {name for text in texts for _, name, _ in document_results.SECTION.findall(text)}
+    for name in names - {"speed", "shares", "towers", "misses", "six_rows", "boreal_map", "scaling"}:
+        assert re.search(r"[Nn]ot (run|timed) yet: `python analysis/", document_results.section(results, name)), name
+    assert document_results.section(results, "six_rows").count("not run yet") == len(main_points.SIX)
+
+
+def test_a_figure_is_shown_once_it_is_drawn(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    results = Results((), experiments.jobs(), tmp_path / "none")
+    Path("results/figures").mkdir(parents=True)
+    Path("results/figures/learning_curves.png").touch()
+    section = document_results.section(results, "figure_learning_curves")
+    assert section.startswith("![Returns and gains") and section.endswith("(../results/figures/learning_curves.png)\n")
 
 
 def test_a_page_without_a_section_is_named(pages):

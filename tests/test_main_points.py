@@ -14,7 +14,7 @@ SCORES = {"plus_100": 70.0, "eupg_var_lambda": 60.0, "ppo_gated": 80.0, "ppo_gro
 @pytest.fixture
 def results(monkeypatch):
     """Rows of one world, a replicate being the script's name; two of the three trained follow one objective."""
-    rows = {(script, WORLD, "vectorization=lockstep"): [script] for script in SCORES if script != "best"}
+    rows = {(script, WORLD, "vectorization=lockstep"): [script] * 5 for script in SCORES if script != "best"}
     rows |= {
         ("ppo_gated", WORLD, "ent_coef=0.0, vectorization=lockstep"): ["ppo_group"],
         ("ppo_curriculum", WORLD, "default"): [],
@@ -41,24 +41,34 @@ def test_six_rows(results):
     assert lines[2:] == [
         "| the best constant plan of each preference | | 100 [95, 105] | 100 [95, 105] |",
         "| +100 a year |  | 70 [65, 75] |  |",
-        "| Variable λ EUPG | 1 | 60 [55, 65] |  |",
-        "| PPO Gated | 1 | 80 [75, 85] |  |",
+        "| Variable λ EUPG | 5 | 60 [55, 65] |  |",
+        "| PPO Gated | 5 | 80 [75, 85] |  |",
         "| Curriculum PPO | not run yet |  |  |",
-        "| Group PPO | 1 | 110 [105, 115] |  |",
+        "| Group PPO | 5 | 110 [105, 115] |  |",
     ]
 
 
 def test_the_words_follow_from_the_numbers(results):
     assert " ".join(main_points.in_words(results).split()) == (
         "- **`boreal-balanced-v0`.** Planting 100 stems a year without looking scores 70. The best of 3 trained "
-        "methods is Group PPO with 110 [105, 115]; PPO Gated and Group PPO are above planting, Group PPO is above 100. "
-        "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it; asked for thaw "
-        "instead of carbon, Group PPO keeps more cold in the ground (intervals over training seeds without 0)."
+        "methods is Group PPO with 110 [105, 115], 5 training seeds; PPO Gated and Group PPO are above planting, Group "
+        "PPO is above 100. Not run yet: Curriculum PPO. Asked for carbon instead of thaw, PPO Gated and Group PPO "
+        "store more carbon for it; asked for thaw instead of carbon, Group PPO keeps more cold in the ground "
+        "(intervals over training seeds without 0)."
     )
 
 
+def test_few_seeds_do_not_say_whether_the_preference_is_followed(results):
+    rows = {key: found[:2] for key, found in results.rows_of_two_objectives().items() if key[0] != "ppo_gated"}
+    words = " ".join(main_points.in_words(SimpleNamespace(rows_of_two_objectives=lambda: rows)).split())
+    assert "110 [105, 115], 2 training seeds;" in words and "Not run yet: PPO Gated and Curriculum PPO." in words
+    assert words.endswith("Whether a method follows the preference is said from 5 training seeds on.")
+
+
 def test_without_runs_nothing_is_said(results):
-    assert main_points.in_words(SimpleNamespace(rows_of_two_objectives=dict)) == "No runs yet.\n"
+    assert main_points.in_words(SimpleNamespace(rows_of_two_objectives=dict)) == (
+        "Not run yet: `python analysis/reproduce.py --only main balanced`.\n"
+    )
 
 
 def test_intervals_are_left_out_where_there_are_none():

@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 from tiny_runs import TINY_RUNS, write_run, write_run_of_three
 
 from analysis import experiments, make_figures, make_tables, methods
-from analysis.figures import many_objectives, training_dynamics
+from analysis.figures import algorithm_comparison, many_objectives, training_dynamics
 from analysis.figures.common import no_data
 from analysis.results import Results
 
@@ -47,7 +47,7 @@ def test_the_papers_panels(figures):
 
 def test_a_panel_without_data_says_which_command_makes_it(figures):
     for ax in lettered(figures["learning_asymmetry"]).values():
-        assert "no run yet: python cleanrl_style/eupg_fixed_lambda.py" in words(ax)
+        assert "not run yet: python cleanrl_style/eupg_fixed_lambda.py" in words(ax)
     assert "python cleanrl_style/eupg_var_lambda.py" in words(lettered(figures["trade_off_coverage"])["b"])
 
 
@@ -55,7 +55,7 @@ def test_a_panel_that_lacks_some_names_them(figures):
     lacking = ", ".join(script for script in methods.LEARNERS if script != "ppo_curriculum")
     for name in ("strategies", "training_dynamics", "individual_objectives", "demographics"):
         for ax in lettered(figures[name]).values():
-            assert f"no run yet: {lacking} (python analysis/reproduce.py --only main)" in words(ax)
+            assert f"not run yet: {lacking} (python analysis/reproduce.py --only main)" in words(ax)
 
 
 def test_what_is_drawn_is_what_the_runs_hold(figures):
@@ -70,13 +70,25 @@ def test_what_is_drawn_is_what_the_runs_hold(figures):
 
 def test_the_same_bytes_again(tmp_path, monkeypatch):
     monkeypatch.setattr(make_figures, "FIGURES", (training_dynamics,))
-    write_run(tmp_path / "runs" / "zero", "zero_change")
+    write_run(tmp_path / "runs" / "gated", "ppo_gated", vectorization="lockstep")
     for name in ("first", "second"):
         make_figures.main(make_figures.Args(runs_dir=(tmp_path / "runs",), figures_dir=tmp_path / name))
     names = sorted(path.name for path in (tmp_path / "first").iterdir())
     assert names == ["training_dynamics.pdf", "training_dynamics.png"]
     for name in names:
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
+
+
+def test_a_figure_without_data_is_removed(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(make_figures, "FIGURES", (training_dynamics, algorithm_comparison))
+    write_run(tmp_path / "runs" / "zero", "zero_change")
+    (tmp_path / "figures").mkdir()
+    for name in ("training_dynamics.png", "training_dynamics.pdf", "many_objectives_timber-v0.png", "mine.png"):
+        (tmp_path / "figures" / name).touch()
+    make_figures.main(make_figures.Args(runs_dir=(tmp_path / "runs",), figures_dir=tmp_path / "figures"))
+    left = {path.name for path in (tmp_path / "figures").iterdir()}
+    assert left == {"mine.png", "algorithm_comparison.png", "algorithm_comparison.pdf"}
+    assert "training_dynamics: python analysis/reproduce.py --only main\n" in capsys.readouterr().out
 
 
 def test_three_objectives_have_a_figure_of_their_own(tmp_path, monkeypatch):
@@ -117,7 +129,7 @@ def test_without_runs_it_names_a_command(tmp_path):
 def test_an_empty_panel_shows_its_command():
     ax = Figure().subplots()
     no_data(ax, "python a.py --seed 1")
-    assert words(ax) == "no run yet: python a.py --seed 1"
+    assert words(ax) == "not run yet: python a.py --seed 1"
 
 
 def test_figures_of_the_quick_jobs_are_drawn():

@@ -19,8 +19,10 @@ from analysis.tables import (
     physical_conflicts,
     single_sites,
 )
+from analysis.tables.common import FORMATS, has_numbers
 from cleanrl_style.protocol.fronts import simplex_lattice
 
+ROOT = Path(__file__).parents[1]
 MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")
 
 
@@ -35,7 +37,8 @@ def no_studies(tmp_path_factory):
 
 def make(runs, folder):
     make_tables.main(make_tables.Args(runs_dir=(runs,), tables_dir=folder))
-    return pd.read_csv(folder / "main_results.csv").set_index(["method", "environment", "setting"])
+    main = folder / "main_results.csv"
+    return pd.read_csv(main).set_index(["method", "environment", "setting"]) if main.exists() else None
 
 
 def read(folder, name, index):
@@ -109,13 +112,17 @@ def test_season_violations_runtime_details(tables):
 
 def test_all_tables_in_all_formats(tables):
     assert len(make_tables.TABLES) == 14
-    for module in make_tables.TABLES:
-        stem = tables / make_tables.name_of(module)
+    stems = [path.with_suffix("") for path in tables.glob("*.csv")]
+    assert {stem.name for stem in stems} == {
+        *("main_results", "detailed_objectives", "lambda_violations", "learned_strategies", "runtime", "warming_flux"),
+        *("growing_season_correlations", "curriculum_selection"),
+    }
+    for stem in stems:
         rows = len(pd.read_csv(stem.with_suffix(".csv")))
         assert len(stem.with_suffix(".md").read_text().splitlines()) == rows + 2
         assert stem.with_suffix(".tex").read_text().count(r" \\") == rows + 1
-    contrast = next(line for line in (tables / "thaw_formulations.md").read_text().splitlines() if "contrast" in line)
-    assert contrast.startswith("| contrast | 0 | no run yet |")
+    contrast = next(line for line in (tables / "warming_flux.md").read_text().splitlines() if "contrast" in line)
+    assert contrast.startswith("| contrast | 0 | not run yet |")
     assert r"ppo\_curriculum" in (tables / "main_results.tex").read_text()
 
 
@@ -228,7 +235,7 @@ def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):
     table = make(tmp_path / "runs", tmp_path / "tables")
     out = capsys.readouterr().out
     assert table.loc[MAIN].seeds == 0 and np.isnan(table.loc[MAIN].scalarized)
-    assert "no run yet" in (tmp_path / "tables" / "main_results.md").read_text()
+    assert "not run yet" in (tmp_path / "tables" / "main_results.md").read_text()
     assert "python cleanrl_style/ppo_curriculum.py --seed 1 --vectorization lockstep\n" in out
     assert "python baselines_heuristic/zero_change.py\n" not in out
     assert "python analysis/studies/mechanism_pairs.py\n" in out
@@ -483,10 +490,25 @@ def test_single_sites(tmp_path):
     assert np.isnan(row.thaw_eupg) and np.isnan(row.thaw_total)
 
 
-def test_studies_leave_out_nothing_silently(tmp_path):
-    folder = Path(tmp_path)
-    make(TINY_RUNS, folder)
-    assert "not played yet" in (folder / "physical_conflicts.md").read_text()
+def test_a_table_without_numbers_is_named_and_removed(tmp_path, capsys):
+    stale = [tmp_path / f"{name}{end}" for name in ("physical_conflicts", "main_results_timber-v0") for end in FORMATS]
+    for path in [*stale, tmp_path / "mine.csv"]:
+        path.touch()
+    make(TINY_RUNS, tmp_path)
+    assert not any(path.exists() for path in stale) and (tmp_path / "mine.csv").exists()
+    assert "physical_conflicts: python analysis/reproduce.py --only mechanisms\n" in capsys.readouterr().out
+
+
+def test_every_table_and_figure_names_its_command():
+    for module in (*make_tables.TABLES, *make_figures.FIGURES):
+        for command in module.MADE_BY.split(" && "):
+            script, *words = command.removeprefix("python ").split(" --only ")
+            assert (ROOT / script).exists() and {*" ".join(words).split()} <= {*experiments.EXPERIMENTS}, module
+
+
+def test_numbers_of_the_paper_are_none_of_ours():
+    table = pd.DataFrame({"method": ["a"], "seeds": [0], "paper_x": [1.0], "x": [np.nan], "source": ["y"]})
+    assert not has_numbers(table, list(table)) and has_numbers(table.assign(x=0.0), list(table))
 
 
 def test_a_choice_that_all_years_bear_on():
@@ -539,7 +561,7 @@ def test_what_learning_is_up_against(tmp_path):
     gradient = table.loc[(learning_difficulty.GRADIENT, "episodes, total utility, baseline: none")]
     assert gradient[["carbon", "carbon_low", "thaw", "thaw_low"]].tolist() == [20, 10, np.inf, 90]
     nothing = learning_difficulty.make(Results((TINY_RUNS,), experiments.jobs(), TINY_RUNS / "no studies"))
-    assert all(text.startswith("not there: python analysis/") for text in nothing.quantity)
+    assert all(text.startswith("not run yet: python analysis/") for text in nothing.quantity)
 
 
 # ----------------------------------------------------------------------------------- where they come from and go

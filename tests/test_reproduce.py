@@ -114,6 +114,16 @@ def test_list_prints_the_commands(capsys):
     ]
 
 
+def test_what_trains_nothing_can_be_run_alone(capsys):
+    run_script("analysis/reproduce.py", "--list", "--only", "main", "balanced", "--untrained")
+    strategies = [f"python baselines_heuristic/{script}.py" for script in methods.STRATEGIES]
+    assert capsys.readouterr().out.splitlines() == [
+        *strategies,
+        "python analysis/studies/constant_plans.py",
+        *(f"{line} --env-id boreal-balanced-v0" for line in strategies),
+    ]
+
+
 def test_finished_runs_are_recognised(tmp_path):
     configs = reproduce.finished_configs(TINY_RUNS, Path(tmp_path))
     done = {

@@ -1,1 +1,1 @@
-"""The paper's figures, one a module: SIZE, CAPTION (what the bands are) and `draw(figure, results)`."""
+"""The paper's figures, one a module: SIZE, MADE_BY (a command), CAPTION (what bands are), `draw(figure, results)`."""

@@ -11,6 +11,7 @@ from analysis.figures.common import (
     learning_curve,
     legend,
     mean_front,
+    no_data,
     panels,
     wanting,
     weight_points,
@@ -18,6 +19,7 @@ from analysis.figures.common import (
 from analysis.methods import LEARNERS, METHODS, STRATEGIES
 
 SIZE = (7, 5.6)
+MADE_BY = "python analysis/reproduce.py --only main"
 SHOWN = (*LEARNERS, *STRATEGIES)
 CAPTION = (
     f"Returns are sums over 50 years. (a) {SEEDS_95}. (b) 0: doing nothing, 100: the best constant plan of each "
@@ -37,6 +39,7 @@ def draw(figure, results) -> None:
     finish(learning, ylabel="scalarised return", **STEPS)
 
     shown = [METHODS[script] for script in SHOWN if not wanting(bars, results, "main", script)]
+    shown = [method for method in shown if not np.isnan([one.score for one in results.of("main", method.script)]).all()]
     for k, method in enumerate(shown):
         replicates = results.of("main", method.script)
         for offset, policy, opacity in ((-0.2, "greedy", 0.8), (0.2, "sampled", 0.4)):
@@ -44,9 +47,12 @@ def draw(figure, results) -> None:
             bars.bar(k + offset, np.mean(scores), 0.38, color=method.colour, alpha=opacity)
             bars.plot(np.full(len(scores), k + offset), scores, "o", color="black", markersize=2)
     bars.set_xticks(range(len(shown)), [method.title for method in shown], rotation=40, ha="right")
-    for level in (0, 100):
+    for level in (0, 100) if shown else ():
         bars.axhline(level, color="black", linewidth=0.5)
-    finish(bars, ylabel="score")
+    if results.constant_plans is None:
+        no_data(bars, "python analysis/studies/constant_plans.py")
+    else:
+        finish(bars, ylabel="score")
 
     for script in SHOWN:
         if not wanting(trade_offs, results, "main", script):

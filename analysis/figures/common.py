@@ -40,6 +40,12 @@ def save(figure: Figure, stem: Path) -> None:
         figure.savefig(file, format="pdf", metadata={"Creator": None, "Producer": None, "CreationDate": None})
 
 
+def remove(stem: Path) -> None:
+    """Remove what an earlier `save` left."""
+    for suffix in (".png", ".pdf"):
+        stem.with_suffix(suffix).unlink(missing_ok=True)
+
+
 def panels(figure: Figure, rows: int, columns: int, titles: list[str]) -> list:
     """Axes with letters and titles, row by row, one a title."""
     axes = list(figure.subplots(rows, columns, squeeze=False).flat)
@@ -61,11 +67,11 @@ def no_data(ax, *commands: str) -> None:
     ax.text(
         0.5,
         0.5,
-        "\n".join(["no run yet:", *lines]),
+        "\n".join(["not run yet:", *lines]),
         transform=ax.transAxes,
         ha="center",
         va="center",
-        fontsize=6,
+        fontsize=5,
         family="monospace",
         wrap=True,
     )
@@ -96,7 +102,7 @@ def finish(ax, **labels) -> None:
     if wanted:
         experiments = " ".join(dict.fromkeys(job.experiment for job in wanted))
         note = [
-            *textwrap.wrap("no run yet: " + ", ".join(job.script for job in wanted), 60),
+            *textwrap.wrap("not run yet: " + ", ".join(job.script for job in wanted), 60),
             f"(python analysis/reproduce.py --only {experiments})",
         ]
         ax.text(0.99, 0.01, "\n".join(note), transform=ax.transAxes, ha="right", va="bottom", fontsize=5)

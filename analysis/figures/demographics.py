@@ -7,6 +7,7 @@ from analysis.figures.common import SEEDS_95, finish, learners, legend, letter, 
 from analysis.reduction import BINS
 
 SIZE = (7, 7)
+MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
     f"(a-e) evaluation, mean over the weights 0, 0.5 and 1; solid: conifers, dashed: deciduous; {SEEDS_95}. "
     "(f) last fifth of the training episodes of all seeds. (g) last year: median and 80 % of the episodes, a "

@@ -15,7 +15,8 @@ from analysis.figures.common import (
 )
 
 SIZE = (7, 5.2)
-CAPTION = f"Returns are sums over 50 years; {SEEDS_95}. (c, d) means over 100 episodes."
+MADE_BY = "python analysis/reproduce.py --only main"
+CAPTION = f"Returns are sums over 50 years; {SEEDS_95}. (c, d) means over the episodes."
 OBJECTIVES = {"carbon_return": "carbon return", "thaw_return": "thaw return"}
 
 

@@ -18,6 +18,7 @@ from analysis.figures.common import (
 from analysis.figures.learning_curves import gain_curve
 
 SIZE = (7.2, 5.0)
+MADE_BY = "python analysis/reproduce.py --only fixed site"
 CAPTION = (
     "Fixed λ EUPG, one agent a weight; sums over 50 years; gains: less zero change on the same episodes; "
     f"{SEEDS_95}; (b, f) over sites. (f) agents of one objective alone, its gain in training; dashed: with "

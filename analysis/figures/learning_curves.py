@@ -20,6 +20,7 @@ from analysis.studies import constant_plans
 from analysis.studies.training_gains import gains
 
 SIZE = (7.2, 4.8)
+MADE_BY = "python analysis/reproduce.py --only main"
 PARTS = 20  # of the training; fewer than of a learning curve, as a part of the episodes has a gain
 CAPTION = (
     "Sums over 50 years: (a-c) returns of training episodes, (d-f) less those of zero change on the same "

@@ -9,6 +9,7 @@ from analysis.studies.signal_to_noise import CONTRASTS, UNIFORM, WEIGHTINGS
 from analysis.tables.learning_difficulty import YEAR, variance_components
 
 SIZE = (7, 5.8)
+MADE_BY = "python analysis/studies/variance.py && python analysis/reproduce.py --only difficulty"
 CAPTION = (
     f"(b)-(d) one action in year {YEAR} under uniformly random valid actions, the same sites and weathers with either "
     "action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside. (d) half of the episodes "

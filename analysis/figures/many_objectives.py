@@ -20,6 +20,8 @@ CAPTION = (
     "largest weight, grey where several share it; dashed: methods that do not look at the weight."
 )
 
+STEM = "many_objectives"
+
 
 def figures(results) -> dict:
     """File name -> function that draws it into a figure, and its size in inches."""
@@ -32,7 +34,7 @@ def figures(results) -> dict:
             fixed = {key: one for key, one in rows.items() if key not in followers}
             columns = 4 if len(objectives) == 3 else 1
             size = (2.8 + 1.9 * (columns - 1) if columns > 1 else 5.0, 0.7 + 2.1 * len(followers))
-            found[f"many_objectives_{file_stem(env_id)}"] = (size, drawn(objectives, followers, fixed))
+            found[f"{STEM}_{file_stem(env_id)}"] = (size, drawn(objectives, followers, fixed))
     return found
 
 

@@ -17,6 +17,7 @@ from analysis.reduction import AGE_CLASSES, SPECIES
 from analysis.results import by_year
 
 SIZE = (7, 5.4)
+MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
     "(a) mean over the seeds in eighths of the training, the mark is the last. (b) a point a weight. "
     f"(c) {SEEDS_95}. (d) mean over the weights 0, 0.5 and 1 and seeds; bars: sd over seeds."

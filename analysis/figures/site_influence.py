@@ -5,6 +5,7 @@ from analysis.figures.common import SEEDS_95, STEPS, finish, learners, learning_
 from analysis.studies import open_loop
 
 SIZE = (7, 3)
+MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = f"(a) evaluation, a point a site, mean over weights and seeds. (b) {SEEDS_95}."
 
 

@@ -11,8 +11,9 @@ from analysis.figures.common import (
 )
 
 SIZE = (7, 5.2)
+MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
-    f"Evaluation, means over 100 episodes and the weights 0, 0.5 and 1; {SEEDS_95}. (c) last year: median, and "
+    f"Evaluation, means over the episodes and the weights 0, 0.5 and 1; {SEEDS_95}. (c) last year: median, and "
     "80 % of the episodes, a cross a weight and seed. (d) all weights; eighths of the episodes by days above "
     "5 °C."
 )

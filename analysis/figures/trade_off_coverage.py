@@ -4,8 +4,9 @@ from analysis.figures.common import RETURNS, finish, panels, wanting, weight_poi
 from analysis.methods import FIXED_WEIGHT, LEARNERS, METHODS, scripts
 
 SIZE = (7, 5.4)
+MADE_BY = "python analysis/reproduce.py --only main fixed"
 CAPTION = (
-    "Evaluation, means over 100 episodes, sums over 50 years. Large: mean over seeds; small: seeds; line: the "
+    "Evaluation, means over the episodes, sums over 50 years. Large: mean over seeds; small: seeds; line: the "
     "points that none dominates."
 )
 PANELS = dict.fromkeys(scripts(FIXED_WEIGHT), "fixed") | dict.fromkeys(LEARNERS, "main")  # script -> experiment

@@ -3,6 +3,7 @@
 from analysis.figures.common import SEEDS_95, STEPS, finish, learners, learning_curve, legend, panels
 
 SIZE = (7, 2.9)
+MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = f"Training episodes; {SEEDS_95}."
 
 

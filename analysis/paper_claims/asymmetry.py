@@ -92,7 +92,6 @@ def carbon_is_learnt(evidence):
     "Agents trained for thaw alone hardly improve.",
     "Section 4.2, figure 2a",
     FIXED,
-    why="Planting protects the ground too, and agents of this weight find it.",
     note=LIMIT,
 )
 def thaw_is_not_learnt(evidence):
@@ -173,9 +172,8 @@ def constant_gains(evidence, weight: float) -> pd.Series:
     only("main", "site"),
     why="Episodes of site-specific mode differ in the agent's actions alone, so there is no noise but theirs; the "
     "delay is there. EUPG weighs every action by all that is to come, and thaw's is large beside what a policy "
-    "moves. With the mean of the batch's other episodes taken off, which leaves the expected gradient as it is, "
-    "agents of thaw alone gain what constant plans can, by the same physics. Over all sites a common mean is no "
-    "such help, for it is the sites that differ (`docs/learning.md`).",
+    "moves. With the mean of the batch's other episodes taken off the expected gradient is as it is, and the delay "
+    "is as it is too.",
     note="The paper names delay and noise together; the noise of sites is judged below.",
     kind=CONTROL,
 )
@@ -232,7 +230,6 @@ def carbon_density(evidence):
     "Thaw agents stay at 1000 to 1020 stems/ha.",
     "Section 4.2, figure 2c",
     FIXED,
-    why="Trees shelter the ground here and thin its snow, so an agent of thaw plants as well.",
     kind=LEVEL,
 )
 def thaw_density(evidence):
@@ -247,7 +244,6 @@ def thaw_density(evidence):
     "Carbon agents end with denser stands than thaw agents.",
     "Section 4.2, figure 2c",
     FIXED,
-    why="Both objectives gain by planting; what sets them apart is the species.",
 )
 def carbon_is_denser(evidence):
     apart = difference(at_the_end(evidence, CARBON, "final_density"), at_the_end(evidence, THAW, "final_density"))
@@ -291,7 +287,6 @@ def thaw_goes_deciduous(evidence):
     "Mixed weights lead to the highest conifer fractions.",
     "Figure 2d",
     FIXED,
-    why="The species that either objective asks for is found at the ends; between them both pull.",
 )
 def mixed_weights_have_most_conifers(evidence):
     ends = {weight: at_the_end(evidence, weight, "final_conifer_fraction") for weight in (THAW, CARBON)}
@@ -314,9 +309,7 @@ def share(evidence, objective: str, component: str) -> Number:
     "The site decides about thaw, whatever the management.",
     "Appendix, site influence; section 4.3",
     VARIANCE,
-    note="It describes how sites are sampled. That boundary and climate are drawn independently of each other "
-    "explains less than half of it, and the site would decide without that (see where the objectives "
-    "conflict, in `docs/model.md`).",
+    note="It describes how sites are sampled: boundary and climate are drawn independently of each other.",
 )
 def site_decides_thaw(evidence):
     site = share(evidence, "thaw", "site")
@@ -338,8 +331,7 @@ def on_one_site(evidence, objective: str) -> Number:
     "Carbon gives clear feedback on actions, thaw a noisy one.",
     "Sections 4.2 and 5",
     VARIANCE,
-    note="Over all sites, which is what a policy gradient without a critic sees. To an agent that knows its site "
-    "thaw is the noisier one too, but not lost in noise.",
+    note="Over all sites, which is what a policy gradient without a critic sees.",
 )
 def carbon_feedback_is_clear(evidence):
     carbon, thaw = share(evidence, "carbon", "policy"), share(evidence, "thaw", "policy")

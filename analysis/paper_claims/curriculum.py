@@ -45,7 +45,6 @@ def compared(name: str, first: pd.Series, other: str, second: pd.Series):
     "Even a random selection of sites brings significant benefits: at the same number of years trained on.",
     "Curriculum mechanism (our control)",
     CONTROLS,
-    why="Years of selected sites are worth no more than years of any sites.",
     note="The curriculum trains on about half of its episodes: without selection the agent has half the budget. "
     "At the same budget of simulation the two are compared above.",
     kind=CONTROL,
@@ -179,7 +178,6 @@ def accepted_are_safe(evidence):
     "The threshold breathes: training expands and contracts with the agent's competence.",
     "Curriculum mechanism",
     MAIN,
-    why="The threshold moves one way in nearly all rollouts.",
     note="Only directions are judged: by a thousandth a rollout, which is the paper's, the threshold cannot move "
     "far within the budget, whichever way.",
 )

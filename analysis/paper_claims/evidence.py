@@ -136,4 +136,4 @@ def optional(measure: Callable[[], Number]) -> Number | str:
     try:
         return measure()
     except Missing:
-        return "no runs yet"
+        return "not run yet"

@@ -47,7 +47,6 @@ def warming(one) -> dict:
     "The asymmetric thaw reward is the hardest: contrast and raw degree-days score higher.",
     "Table 3",
     THAW,
-    why="The other formulas are no easier to gain by.",
     note="Judged by gains over doing nothing, each in the units of its own reward: where warming weighs less, the same "
     "ground returns more, whatever was learnt, so returns could not speak against the claim.",
 )
@@ -141,7 +140,6 @@ def asymmetric_avoids_warming(evidence):
     "Agents of the asymmetric reward keep the warming flux near 0.1 MJ.",
     "Table of thaw penalties",
     MAIN,
-    note="Most of the flux is the site's; zero change has nearly the same.",
     kind=LEVEL,
 )
 def warming_is_small(evidence):
@@ -240,9 +238,7 @@ def effect(evidence, pair: str, variable: str, off: str = ALL_ON) -> Number:
     "Section 4.4, figure 4d",
     STUDY,
     note="Where the paper correlates across sites, this changes one thing: the dates of leaves, on the same sites "
-    "and weathers. Stands are left alone. The sign is the paper's, the mechanism is not: leaves that are still "
-    "on the trees in autumn catch snow, and without interception the same leaves, which shade and transpire "
-    "as before, cost thaw return.",
+    "and weathers. Stands are left alone.",
 )
 def season_of_leaves(evidence):
     pair = SEASON_PAIRS["leaves"]
@@ -345,8 +341,7 @@ def interception_adds(evidence, pair: str) -> Number:
     STUDY,
     why="One of the three parts has the other sign; which it is say the rows.",
     note="By its introduction less snow on the ground lets the cold in, and large gains of energy in summer can "
-    "overwhelm that; its table calls the conflict complex. Which of the two wins here turns with the constant wind "
-    "that a site is given (see where the objectives conflict, in `docs/model.md`).",
+    "overwhelm that; its table calls the conflict complex.",
 )
 def stems(evidence):
     carbon, thaw = (effect(evidence, STEM_PAIR, f"{name}_return") for name in ("carbon", "thaw"))

@@ -59,8 +59,6 @@ def paper_change(script: str) -> tuple[float, float]:
     "Curriculum PPO follows the preference.",
     "Figure 3d; table of detailed objectives",
     only("main", "variants"),
-    why="Both returns rise with the carbon weight: asked for thaw the agent plants less. With each objective's "
-    "advantages normalised apart carbon follows the preference, and thaw more than without.",
 )
 def curriculum_follows(evidence):
     carbon, thaw, answer = follows(evidence, "main", CURRICULUM)
@@ -90,7 +88,6 @@ def apart_rows(evidence) -> list[Row]:
     "Standard preference-conditioned PPO fails to follow the preference.",
     "Abstract; section 4.3",
     MAIN,
-    why="It follows here, however little.",
 )
 def gated_does_not_follow(evidence):
     carbon, thaw, answer = follows(evidence, "main", GATED)
@@ -106,9 +103,6 @@ def gated_does_not_follow(evidence):
     "Thaw is hard for its asymmetry and physics, not for a difference in the rewards' magnitude.",
     "Appendix, reward function",
     only("main", "thaw", "variants", "balanced"),
-    why="Neither is what makes it hard. Without asymmetry agents gain no more; sites' noise does, and an agent that is "
-    "judged against others on its own site learns thaw under the same reward and the same physics "
-    "(`docs/learning.md`).",
     note="The scale of `boreal-balanced-v0`, at which policies move both returns alike, does not make their noise "
     "alike.",
 )
@@ -179,7 +173,6 @@ def violation(evidence, script: str, name: str = "violations_percent") -> pd.Ser
     "Curriculum PPO violates λ-monotonicity least (50 %).",
     "Appendix, λ-monotonicity",
     only("main", "fixed"),
-    why="Both returns of the PPOs rise with the carbon weight, which thaw's must not; EUPG's do not move.",
     note="The paper counts a return that fails to increase, ties included, and so does the verdict; without ties, "
     "one that moves the wrong way counts. In random order: the same points, shuffled. Beyond their interval: "
     "only changes larger than their paired interval over episodes count.",
@@ -228,7 +221,6 @@ def gated_always_violates(evidence):
     "Curriculum PPO violates λ-monotonicity less than its own points in random order.",
     "Appendix, λ-monotonicity (our control)",
     MAIN,
-    why="The policy hardly differs between weights.",
     note="That the order of the weights is not a random one is not yet that the preference is followed, which is "
     "judged above.",
     kind=CONTROL,

@@ -48,9 +48,6 @@ def strategy(evidence, script: str, name: str) -> pd.Series:
     "0.35 to 0.65.",
     "Section 4.4, figure 4a; appendix, demographics",
     MAIN,
-    why="At equal weights the species hardly matters on average: what conifers gain in thaw they lose in carbon "
-    "(`docs/learning.md`, signal to noise). Both PPOs stay near the even mix that they start from, EUPG goes "
-    "where its seed leads.",
     kind=LEVEL,
 )
 def conifer_fractions(evidence):
@@ -104,7 +101,6 @@ def curriculum_is_denser(evidence):
     "Variable λ EUPG falls into inaction: minimal changes.",
     "Section 4.4; table of learned strategies",
     MAIN,
-    why="Without an entropy bonus it settles on few actions, and on planting ones.",
     note='The appendix says of the same agent that it "exhibits sustained density growth".',
 )
 def eupg_does_little(evidence):
@@ -130,7 +126,6 @@ def eupg_does_little(evidence):
     "PPO Gated plants early and fast; stands thin naturally later.",
     "Section 4.4, figure 4b",
     MAIN,
-    why="The agent plants as long as there is room, and mortality makes room every year.",
 )
 def early_growth(evidence):
     curves = by_year(evidence.replicates("main", GATED), "density_stems_ha")
@@ -161,7 +156,6 @@ def gain(evidence, script: str, objective: str) -> pd.Series:
     "PPO Gated farms carbon and fails to protect permafrost.",
     "Section 4.4; table of learned strategies",
     MAIN,
-    why="Planting gains in both objectives on average here (see the claim on more stems).",
 )
 def gated_fails_permafrost(evidence):
     carbon, thaw = (seeds(gain(evidence, GATED, f"{name}_return")) for name in ("carbon", "thaw"))
@@ -173,7 +167,6 @@ def gated_fails_permafrost(evidence):
     "Curriculum PPO protects permafrost better than PPO Gated.",
     "Section 4.4; table of detailed objectives",
     MAIN,
-    why="Trained on other episodes, the same agent finds the same kind of policy.",
     repeats=curriculum_beats_gated,
 )
 def curriculum_protects(evidence):
@@ -198,8 +191,6 @@ def older_deciduous(one) -> dict:
     "Variable λ EUPG keeps most mature and old deciduous trees.",
     "Appendix, demographics",
     MAIN,
-    why="Its agents settle on one mix, at every weight, and mostly on one of more conifers than both PPOs end with: "
-    "fewer deciduous trees are planted that could grow old.",
 )
 def eupg_keeps_old_trees(evidence):
     stems = {script: evidence.by_seed(older_deciduous, "main", script)["stems"] for script in FRACTIONS}

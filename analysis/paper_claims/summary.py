@@ -25,7 +25,7 @@ class Sentence:
         words = self.holds if found.verdict == HOLDS else self.otherwise
         words = self.fails if found.verdict in (FAILS, CONTRADICTS) else words
         row = next((row for row in found.rows if row.what == self.row), None)
-        numbers = "no runs yet"
+        numbers = "not run yet"
         if row is not None:
             numbers = f"{row.what}: {row.ours}" + (f", the paper's {row.paper}" if row.paper else "")
         return f"{words} ({numbers}; [claim {number}](#claim-{number}))."

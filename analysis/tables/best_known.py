@@ -17,6 +17,7 @@ from cleanrl_style.protocol.fronts import evaluation_weights
 from cleanrl_style.protocol.score import by_weight
 
 TITLE = "Share of the best known plans"
+MADE_BY = "python analysis/best_plans.py"
 WEIGHTS = evaluation_weights(2)
 NOTHING = "12 12 12 12 12"
 CONSTANT = "best_constant_of_site"
@@ -93,5 +94,5 @@ def make(results) -> pd.DataFrame:
         if path.exists():
             rows += rows_of(results, env_id, stored.read(path, text=("plan",)))
     ends = [f"{name}{end}" for name in list(COLUMNS)[6:] for end in ("_low", "_high")]
-    rows = rows or [{"method": "no plans yet", "seeds": 0}]
+    rows = rows or [{"method": "not run yet", "seeds": 0}]
     return pd.DataFrame(rows).reindex(columns=[*COLUMNS, *ends])

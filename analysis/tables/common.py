@@ -14,6 +14,11 @@ PAPER_TABLES = Path(__file__).parents[1] / "paper_tables"
 ROW_COLUMNS = {"method": "method", "environment": "environment", "setting": "setting", "seeds": "seeds"}
 
 
+#: Columns with numbers that are there without a run.
+NAMES = (*ROW_COLUMNS, "weight", "sites", "site_seed")
+FORMATS = (".csv", ".md", ".tex")
+
+
 def paper(name: str, **arguments) -> pd.DataFrame:
     """A table of the paper."""
     return pd.read_csv(PAPER_TABLES / f"{name}.csv", **arguments)
@@ -52,8 +57,20 @@ def readable(table: pd.DataFrame, columns: dict[str, str]) -> pd.DataFrame:
     cells = [[cell(row, name) for name in columns] for _, row in table.iterrows()]
     text = pd.DataFrame(cells, columns=list(columns.values()))
     if "seeds" in table and "weight" not in table:
-        text.iloc[(table.seeds == 0).to_numpy().nonzero()[0], list(columns).index("seeds") + 1] = "no run yet"
+        text.iloc[(table.seeds == 0).to_numpy().nonzero()[0], list(columns).index("seeds") + 1] = "not run yet"
     return text
+
+
+def has_numbers(table: pd.DataFrame, columns) -> bool:
+    """Whether any of the shown columns has a number of ours: not the paper's, nor one that only names a row."""
+    ours = [name for name in columns if name in table and name not in NAMES and not name.startswith("paper")]
+    return any(pd.to_numeric(table[name], errors="coerce").notna().any() for name in ours)
+
+
+def remove_table(stem: Path) -> None:
+    """Remove what an earlier `write_table` left."""
+    for suffix in FORMATS:
+        stem.with_suffix(suffix).unlink(missing_ok=True)
 
 
 def write_table(stem: Path, table: pd.DataFrame, text: pd.DataFrame) -> None:

@@ -6,6 +6,7 @@ from analysis import metrics
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Detailed objectives"
+MADE_BY = "python analysis/reproduce.py --only main"
 COLUMNS = ROW_COLUMNS | {
     "weight": "weight",
     "carbon_return": "carbon",

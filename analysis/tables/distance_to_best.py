@@ -11,6 +11,7 @@ from analysis.studies.distance_to_best import TEXT
 from analysis.tables.common import ROW_COLUMNS, over_seeds
 
 TITLE = "Distance to the best known plans"
+MADE_BY = "python analysis/reproduce.py --only difficulty"
 ALL, SINGLE = "all", "with agents of their own"
 ROW = ["method", "environment", "setting", "policy"]
 COLUMNS = ROW_COLUMNS | {
@@ -38,7 +39,7 @@ def make(results) -> pd.DataFrame:
     path = results.studies_dir / "distance_to_best.csv"
     columns = [*ROW, "seeds", "sites", *(name for name in COLUMNS if name.startswith(("share", "hyper")))]
     if not path.exists():
-        return pd.DataFrame([{"method": "not played yet", "seeds": 0}], columns=columns)
+        return pd.DataFrame([{"method": "not run yet", "seeds": 0}], columns=columns)
     table = stored.read(path, text=TEXT)
     alone = table[table.trained_on != ""]
     some = table[table.site.isin(set(alone.site))]

@@ -16,6 +16,7 @@ from analysis.studies.mechanism_pairs import effects
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Growing-season correlations"
+MADE_BY = "python analysis/reproduce.py --only main"
 VARIABLES = {
     "thaw_return": "thaw_reward",
     "latent_heat_mj_m2": "latent_heat",

@@ -11,6 +11,7 @@ from analysis import metrics
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 TITLE = "Lambda violations"
+MADE_BY = "python analysis/reproduce.py --only main"
 COLUMNS = ROW_COLUMNS | {
     "pairs": "pairs of weights",
     "violations_percent": "violations %",

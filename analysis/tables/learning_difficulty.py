@@ -11,6 +11,7 @@ from analysis.studies.open_loop import OBJECTIVES
 from analysis.studies.signal_to_noise import CONTRASTS, EVERY, UNIFORM, YEARS, episodes_needed
 
 TITLE = "Difficulty of learning"
+MADE_BY = "python analysis/studies/variance.py && python analysis/reproduce.py --only difficulty"
 COLUMNS = {"of": "of", "quantity": "quantity", "carbon": "carbon", "thaw": "thaw"}
 GRADIENT = "EUPG's gradient, as much signal as noise"
 VALUES = {"return": "variance of returns", "one year": "variance of one year's rewards"}
@@ -75,7 +76,7 @@ def make(results) -> pd.DataFrame:
     components = variance_components(results)
     for value, title in VALUES.items():
         if components is None:
-            rows.append({"of": title, "quantity": "not there: python analysis/studies/variance.py"})
+            rows.append({"of": title, "quantity": "not run yet: python analysis/studies/variance.py"})
             continue
         of_value = components[components.value == value]
         for component in dict.fromkeys(of_value.component):
@@ -84,7 +85,7 @@ def make(results) -> pd.DataFrame:
     table = results.study("signal_to_noise")
     for contrast in CONTRASTS:
         if table is None:
-            rows.append({"of": contrast, "quantity": "not there: python analysis/studies/signal_to_noise.py"})
+            rows.append({"of": contrast, "quantity": "not run yet: python analysis/studies/signal_to_noise.py"})
             continue
         case = table[(table.reference == UNIFORM) & (table.contrast == contrast) & (table.year == YEAR)]
         for quantity, (weighting, column, factor) in EFFECTS.items():
@@ -100,7 +101,7 @@ def make(results) -> pd.DataFrame:
             rows.append({"of": contrast, "quantity": quantity, **needed})
     gradients = results.study("gradient_noise")
     if gradients is None:
-        rows.append({"of": GRADIENT, "quantity": "not there: python analysis/studies/gradient_noise.py"})
+        rows.append({"of": GRADIENT, "quantity": "not run yet: python analysis/studies/gradient_noise.py"})
     else:
         for (utility, baseline), case in gradients.groupby(["utility", "baseline"], sort=False):
             needed = of_objectives(case.set_index("objective"), "episodes", 1)

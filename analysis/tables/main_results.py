@@ -17,6 +17,7 @@ from cleanrl_style.protocol.evaluation import PRIMARY
 from cleanrl_style.protocol.fronts import evaluation_weights
 
 TITLE = "Main results"
+MADE_BY = "python analysis/reproduce.py --only main"
 #: Rows of plans that look at nothing: name -> title, and whether it is the best plan of each weight.
 CONSTANT_PLANS = {
     "dense_conifer": ("100 conifers a year", False),

@@ -11,6 +11,7 @@ from analysis.results import PAIR
 from analysis.tables import detailed_objectives, main_results
 from analysis.tables.common import ROW_COLUMNS
 
+STEMS = ("main_results", "detailed_objectives")
 RESPONSES = {"change": "{}, own weight lowest to highest", "slope": "slope of {} against own weight"}
 DETAILS = {"return": "{}", "sd_over_episodes": "sd over episodes, {}", "gain": "{} gain"}
 
@@ -61,6 +62,6 @@ def make(results) -> dict[str, tuple[pd.DataFrame, dict]]:
         if objectives != PAIR:
             rows |= {key: one for key, one in main_results.constant_plans(results, [env_id]).items() if one}
             name = file_stem(env_id)
-            tables[f"main_results_{name}"] = main_table(rows, objectives)
-            tables[f"detailed_objectives_{name}"] = detailed_table(rows, objectives)
+            for stem, table in zip(STEMS, (main_table, detailed_table), strict=True):
+                tables[f"{stem}_{name}"] = table(rows, objectives)
     return tables

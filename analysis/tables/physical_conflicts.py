@@ -11,6 +11,7 @@ from analysis.studies.mechanism_pairs import ALL_ON, PAIRS, effects
 from analysis.tables.common import paper
 
 TITLE = "Physical conflicts"
+MADE_BY = "python analysis/reproduce.py --only mechanisms"
 EFFECTS = (
     "carbon_return",
     "thaw_return",
@@ -61,7 +62,7 @@ def make(results) -> pd.DataFrame:
     published = paper("physical_conflicts", index_col="variable").add_prefix("paper_")
     pairs, rows = results.study("mechanism_pairs"), []
     for pair in PAIRS:
-        row = {"change": pair, "conflict": "not played yet"}
+        row = {"change": pair, "conflict": "not run yet"}
         row |= next((published.loc[name].to_dict() for name in published.index if pair.startswith(name)), {})
         if pairs is not None:
             apart = {name: effects(pairs, pair, name) for name in EFFECTS}

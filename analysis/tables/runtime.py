@@ -7,6 +7,7 @@ from analysis import paths
 from analysis.tables.common import over_seeds, paper
 
 TITLE = "Runtime"
+MADE_BY = "python analysis/reproduce.py --only main site"
 COLUMNS = {"quantity": "quantity", "unit": "unit", "seeds": "runs", "ours": "ours", "paper": "paper", "source": "from"}
 TRAINED = {  # our row -> experiment, script, the paper's row
     "EUPG, generalist": ("main", "eupg_var_lambda", "training_generalist_300k_steps"),

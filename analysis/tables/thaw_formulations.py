@@ -7,6 +7,7 @@ from analysis.tables.common import over_seeds, paper
 from analysis.tables.main_results import front_metrics
 
 TITLE = "Thaw formulations"
+MADE_BY = "python analysis/reproduce.py --only main thaw"
 FORMULATIONS = {"asymmetric": "main", "contrast": "thaw", "raw_degree_days": "thaw"}  # -> experiment
 COLUMNS = {
     "formulation": "formulation",
