@@ -36,13 +36,14 @@ def main(script: str, policy) -> None:
     """Evaluate `policy`, a function of observations (n, d) and masks (n, 25), as the script of that name.
 
     It gives actions (n,), or probabilities of actions (n, 25), and does not look at the preference: its episodes
-    are the same under every weight, and are simulated once. None has another policy when greedy: random actions
-    stay random.
+    are the same under every weight, and are simulated once. An action that the mask forbids is not taken, and nothing
+    is done. None has another policy when greedy: random actions stay random.
     """
     args = parse(Args)  # a bad flag is answered before all that follows is loaded
 
     import numpy as np
 
+    from boreal_env import NO_CHANGE
     from cleanrl_style import protocol
 
     task = protocol.make_task(args)
@@ -52,7 +53,9 @@ def main(script: str, policy) -> None:
     def action_probabilities(observations, masks, accrued_returns):
         # laid out as for two objectives, whatever their number: a strategy does not look at the weights
         chosen = policy(observations[:, task.num_objectives - 2 :], masks)
-        return np.eye(25)[chosen] if chosen.ndim == 1 else chosen
+        if chosen.ndim == 2:
+            return chosen
+        return np.eye(25)[np.where(np.take_along_axis(masks, chosen[:, None], 1)[:, 0], chosen, NO_CHANGE)]
 
     with protocol.Run(args, task, Path(script).stem) as run:
         start = time.perf_counter()

@@ -4,8 +4,9 @@ import pytest
 from scripts import run_script
 
 from baselines_heuristic import conifer_restoration, plus_100, random_valid, target_density, zero_change
+from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
-from cleanrl_style.protocol import evaluation
+from cleanrl_style.protocol import evaluation, reference
 
 SCRIPTS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 
@@ -69,13 +70,22 @@ def test_one_simulation_stands_for_every_weight(tmp_path):
         "baselines_heuristic/target_density.py", "--run-dir", tmp_path, "--eval-episodes", 2, "--eval-weights", 0, 0.7
     )
     written = pd.read_csv(tmp_path / "evaluation.csv")
-    simulated, _ = protocol.evaluate(
-        protocol.Task.of("boreal-generalist-v0"),
-        lambda observations, masks, returns: np.eye(25)[target_density.policy(observations, masks)],
-        (0.0, 0.7),
-        2,
-    )
+
+    def where_it_can_be_done(observations, masks, returns):
+        chosen = target_density.policy(observations, masks)
+        return np.eye(25)[np.where(masks[np.arange(len(masks)), chosen], chosen, NO_CHANGE)]
+
+    task = protocol.Task.of("boreal-generalist-v0")
+    simulated, _ = protocol.evaluate(task, where_it_can_be_done, (0.0, 0.7), 2)
     pd.testing.assert_frame_equal(written, simulated, rtol=1e-8, check_dtype=False)
+
+
+def test_planting_every_year_is_the_constant_plan(tmp_path):
+    run_script("baselines_heuristic/plus_100.py", "--run-dir", tmp_path, "--eval-episodes", 2, "--eval-weights", 0, 1)
+    written = pd.read_csv(tmp_path / "evaluation.csv").drop_duplicates("seed")
+    plans = reference.reference_returns(protocol.Task.of("boreal-generalist-v0"), written.seed.tolist())
+    plan = plans[plans.plan == reference.PLUS_100].set_index("seed").loc[written.seed]
+    np.testing.assert_allclose(written[["carbon_return", "thaw_return"]], plan[["carbon_return", "thaw_return"]], 1e-4)
 
 
 def test_users_environments_are_refused(tmp_path):
