@@ -172,6 +172,16 @@ def outside(seeds) -> list[Job]:
     ]
 
 
+def planners(seeds) -> list[Job]:
+    """NSGA-II and MOEA/D with our budget, on both tasks."""
+    return [
+        trained("planners", "moea", seed, **algorithm, **env)
+        for seed in seeds_of(5, seeds)
+        for env in ({}, {"env_id": BALANCED})
+        for algorithm in ({}, {"algorithm": "moead"})
+    ]
+
+
 def fixed_weights(seeds) -> list[Job]:
     """EUPG trained for one weight, on all sites."""
     return [
@@ -288,8 +298,9 @@ class Experiment(NamedTuple):
 EXPERIMENTS = {
     "main": Experiment(main_table, "main table: heuristics, constant plans, and every method of ours with 10 seeds"),
     "balanced": Experiment(balanced, "the same where both objectives weigh alike"),
-    "group": Experiment(group, "group PPO with one choice changed: group size, site, entropy, lambda, reward scale"),
+    "group": Experiment(group, "group PPO with one choice changed, such as the size of groups"),
     "outside": Experiment(outside, "algorithms of other libraries, on both tasks"),
+    "planners": Experiment(planners, "NSGA-II and MOEA/D over a small policy, on both tasks"),
     "fixed": Experiment(fixed_weights, "learning asymmetry: EUPG with a fixed weight, one run a weight and seed"),
     "site": Experiment(single_sites, "the same on single sites, one run a weight and site"),
     "thaw": Experiment(thaw_formulations, "the thaw reward's formulations: gated PPO"),
@@ -313,6 +324,7 @@ def jobs(only=tuple(EXPERIMENTS), seeds: list[int] | None = None) -> list[Job]:
 
 QUICK_STEPS = 1600  # an episode of each of 32 stands
 QUICK_STEPS_ALONE = 400  # of scripts that step one stand
+QUICK_POPULATION = {"population": 8, "episodes_each": 2}  # of NSGA-II, whose generation is more than those steps
 QUICK_EVALUATION = {"eval_episodes": 2, "eval_weights": (0.0, 0.5, 1.0)}
 
 
@@ -332,7 +344,7 @@ def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path | None = None) -> list[Jo
             alone = job.script.startswith("eupg") and "num_envs" not in flags
             steps = QUICK_STEPS_ALONE if alone else QUICK_STEPS
             flags["total_timesteps"] = steps * job.steps // DEFAULT_STEPS[job.mode]
-        flags |= QUICK_EVALUATION
+        flags |= QUICK_EVALUATION | (QUICK_POPULATION if job.script == "moea" else {})
         if "preference" in flags:
             del flags["eval_weights"]  # an agent of one weight is evaluated at it
         flags["run_dir"] = (runs_dir or paths.runs(quick=True)) / f"{number:02d}-{job.script}"
