@@ -45,7 +45,9 @@ def main(args: Args) -> None:
         except (FileNotFoundError, ValueError) as error:
             sys.exit(f"error: {error}")
         saved = torch.load(path / agents.FILE if path.is_dir() else path, weights_only=True)
-        saved["agent"] = {key: value for key, value in saved["agent"].items() if not key.startswith("critic.")}
+        # parameters are views of one tensor, which would be saved whole
+        kept = {key: value.clone() for key, value in saved["agent"].items() if not key.startswith("critic.")}
+        saved["agent"] = kept
         buffer, name = io.BytesIO(), name_of(saved["run"])
         torch.save(saved, buffer)
         if len(buffer.getvalue()) > LARGEST:

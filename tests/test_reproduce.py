@@ -14,8 +14,9 @@ from cleanrl_style.ppo_gated import Args
 COUNTS = {
     "main": 2 + len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
     "balanced": len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
-    "group": 30,
+    "group": 40,
     "outside": 10 * len(methods.OUTSIDE),
+    "planners": 20,
     "fixed": 25,
     "site": 45,
     "thaw": 12,
