@@ -1,6 +1,6 @@
 """Measures what the scales of timber and biodiversity rest on: yearly revenue, and how returns vary between plans.
 
-    python analysis/studies/objective_scales.py      # a minute on two idle cores
+    python analysis/studies/objective_scales.py      # half a minute on two idle cores
 
 Every constant plan is played on the same sampled sites, each with one first stand, weather and dice. The spread of a
 return is its standard deviation between the plans of a site, pooled over sites. Prices change no tree, so that the same
