@@ -48,6 +48,13 @@ def test_six_rows(results):
     ]
 
 
+def test_the_score_of_a_single_training_is_not_shown(results):
+    results.rows_of_two_objectives()["ppo_gated", WORLD, "vectorization=lockstep"].pop()
+    assert "| PPO Gated | 4 | 80 [75, 85] |  |" in main_points.six_rows(results)
+    del results.rows_of_two_objectives()["ppo_gated", WORLD, "vectorization=lockstep"][1:]
+    assert "| PPO Gated | 1 |  |  |" in main_points.six_rows(results)
+
+
 def test_the_words_follow_from_the_numbers(results):
     assert " ".join(main_points.in_words(results).split()) == (
         "- **`boreal-balanced-v0`.** Planting 100 stems a year without looking scores 70. The best of 3 trained "
