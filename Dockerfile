@@ -13,4 +13,4 @@ RUN pip install --no-cache-dir --extra-index-url https://download.pytorch.org/wh
 ENV NUMBA_CACHE_DIR=/borearl/.cache
 RUN python -c "from cleanrl_style import protocol; from sim.block import KERNELS; protocol.compile_physics(KERNELS)"
 
-CMD ["python", "cleanrl_style/ppo_curriculum.py", "--seed", "1", "--vectorization", "lockstep"]
+CMD ["python", "cleanrl_style/ppo_group.py", "--seed", "1", "--vectorization", "lockstep"]

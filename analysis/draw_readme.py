@@ -1,6 +1,6 @@
 """Draws the README's pictures: a stand after 35 years, and fifty years of a policy as an animation.
 
-    python analysis/draw_readme.py [--run-dir runs/ppo_curriculum/boreal-generalist-v0/seed1]
+    python analysis/draw_readme.py [--run-dir runs/ppo_group/boreal-balanced-v0-vectorization=lockstep/seed1]
 
 The stand is planted for twelve years and then left alone. The animation is of conifer restoration, or of the trained
 policy of a run, which plays the same site and weather.

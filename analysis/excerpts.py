@@ -91,14 +91,14 @@ def scaling() -> str:
     text = markdown(header, rows)
     region = table[table.what.str.contains("stands, ")]
     costs = {
-        backend: "; ".join(
-            f"{row.median_:,.0f} {row.unit} ({row.low:,.0f}-{row.high:,.0f})"
+        backend: ", ".join(
+            f"{row.median_:,.3g} {row.unit} ({row.low:,.3g} to {row.high:,.3g})"
             for row in group.rename(columns={"median": "median_"}).itertuples()
         )
         for backend, group in region.groupby("backend", sort=False)
     }
-    what = region.what.iloc[0].replace("1000000", "a million")
-    lines = (f"- {what}, {'on GPUs' if name == 'cuda' else 'on cores'}: {cost}" for name, cost in costs.items())
+    what = region.what.iloc[0].replace("1000000 stands,", "A million stands for")
+    lines = (f"- {what}, {'on GPUs' if name == 'cuda' else 'on cores'}: {cost}." for name, cost in costs.items())
     return text + "\n" + "\n".join(lines) + f"\n\nMeasured on {table.machine.iloc[0]}.\n"
 
 

@@ -8,6 +8,7 @@ stands. The machine is to be idle: times are a clock's, not the processor's.
 """
 
 import statistics
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -97,6 +98,7 @@ def measurements(args: Args) -> Iterator[tuple[tuple, list[float]]]:
             for _ in range(args.repeats + 1):
                 for count, stands in groups.items():
                     rates[count].append(year(stands))
+            print(f"{number:,} stands: {max(map(max, rates.values())):,.0f} stand-years a second", file=sys.stderr)
             for count in counts:
                 yield (backend, "a year", count, number, "stand-years per s"), rates[count][1:]
         env = boreal_env.BorealVectorEnv(args.environments, threads=max(counts), backend=backend, years=1000)

@@ -23,7 +23,7 @@ def test_a_row_a_figure_and_the_region_at_the_best_speed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     lines = excerpts.scaling().splitlines()
     assert lines[0] == "| stands | 1 core: stand-years/s | of its best |" and lines[2].startswith("| 1 | ")
-    assert any(line.startswith("- a million stands, 50 years, on cores: ") and "dollars" in line for line in lines)
+    assert any(line.startswith("- A million stands for 50 years, on cores: ") and "dollars" in line for line in lines)
 
 
 def test_repeated_stands_go_on_as_those_they_repeat():

@@ -37,7 +37,7 @@ class StandCard:
         self.change = pn.widgets.Select(label="Each year", options=CHANGES)
         self.mix = pn.widgets.Select(label="of which", options=MIXES, value=conifers)
         self.folder = pn.widgets.TextInput(
-            label="Folder of the run", placeholder="runs/ppo_curriculum/boreal-generalist-v0/seed1"
+            label="Folder of the run", placeholder="runs/ppo_group/boreal-generalist-v0/seed1"
         )
         self.greedy = pn.widgets.RadioButtonGroup(options=GREEDY, margin=(5, 10))
         self.preference = pn.widgets.FloatSlider(
