@@ -3,7 +3,7 @@
     python analysis/archive.py [--runs-dir runs] [--archive-dir results/runs]
 
 A run's folder there has its config.json as it is, tables.zip with the tables that `analysis/reduction.py` names, and,
-of the runs of the main table, on either task, policy.pt: the agent, which `cleanrl_style.protocol.load_agent` loads.
+of the runs of the main table, on either task, policy.pt: the agent, which `cleanrl_style.protocol.load_policy` loads.
 """
 
 import shutil

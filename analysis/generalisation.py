@@ -175,7 +175,7 @@ def evaluation_of(folder: Path, config: dict, task: protocol.Task, episodes: int
             raise ValueError(f"{folder}: it was evaluated on {chosen.seed.nunique()} of the {episodes} sites")
         return chosen
     weights = config["arguments"]["eval_weights"]
-    return protocol.evaluate(task, protocol.load_agent(folder), weights, episodes, split=split)[0]
+    return protocol.evaluate(task, protocol.load_policy(folder), weights, episodes, split=split)[0]
 
 
 def known_fronts(plans: pd.DataFrame, evaluation: pd.DataFrame) -> pd.DataFrame:

@@ -25,7 +25,7 @@ def evaluate_again(folder, policy):
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_a_loaded_agent_plays_the_evaluation_again(script, tmp_path):
     train(f"cleanrl_style/{script}.py", tmp_path)
-    evaluate_again(tmp_path, protocol.load_agent(tmp_path))
+    evaluate_again(tmp_path, protocol.load_policy(tmp_path))
 
 
 def test_the_agent_of_a_script_elsewhere(tmp_path):
@@ -33,8 +33,8 @@ def test_the_agent_of_a_script_elsewhere(tmp_path):
     path.write_text((ROOT / "cleanrl_style" / "ppo_gated.py").read_text())
     train(path, tmp_path / "run")
     with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_own.py; .*script=path"):
-        protocol.load_agent(tmp_path / "run")
-    evaluate_again(tmp_path / "run", protocol.load_agent(tmp_path / "run", script=path))
+        protocol.load_policy(tmp_path / "run")
+    evaluate_again(tmp_path / "run", protocol.load_policy(tmp_path / "run", script=path))
 
 
 def test_an_agent_of_another_network_is_refused(tmp_path):
@@ -43,7 +43,7 @@ def test_an_agent_of_another_network_is_refused(tmp_path):
     saved["agent"] = {f"older.{name}": value for name, value in saved["agent"].items()}
     torch.save(saved, tmp_path / "policy.pt")
     with pytest.raises(ValueError, match="policy.pt: another version of eupg_var_lambda.py trained it"):
-        protocol.load_agent(tmp_path)
+        protocol.load_policy(tmp_path)
 
 
 def test_a_folder_without_a_policy_is_named(tmp_path):

@@ -48,5 +48,5 @@ def test_cells_lie_where_their_stands_are():
 
 
 def test_unknown_policies_end_the_script(tmp_path):
-    with pytest.raises(SystemExit, match="--policy nobody: neither a run's folder nor a fixed strategy"):
+    with pytest.raises(SystemExit, match="--policy nobody: neither a run's folder, nor a policy that ships"):
         boreal_map.main(boreal_map.Args("nobody"))

@@ -138,7 +138,7 @@ def test_a_strategy_plays_once_for_all_weights(monkeypatch):
 
 
 def test_an_agent_plays_what_it_was_trained_to_observe(tmp_path, monkeypatch):
-    monkeypatch.setattr(distance_to_best.protocol, "load_agent", lambda folder: folder)
+    monkeypatch.setattr(distance_to_best.protocol, "load_policy", lambda folder: folder)
     for arguments, size in (({}, 105), ({"hide_site": True}, 43)):
         policy, kwargs = distance_to_best.agent_policy(tmp_path, {"script": "ppo_gated", "arguments": arguments})
         envs = distance_to_best.OnSites([(SITES[0], 4)], **kwargs)

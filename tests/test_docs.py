@@ -109,7 +109,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
     done = build("-c", "docs", "-d", tmp_path / "trees", ".", tmp_path / "html")
     assert done.returncode == 0, done.stderr
     names = (tmp_path / "html" / "docs" / "api.html").read_text(encoding="utf-8")
-    for name in ("boreal_env.BorealEnv", "boreal_env.NO_CHANGE", "sim.simulate", "cleanrl_style.protocol.load_agent"):
+    for name in ("boreal_env.BorealEnv", "boreal_env.NO_CHANGE", "sim.simulate", "cleanrl_style.protocol.load_policy"):
         assert f'id="{name}"' in names
 
 

@@ -129,7 +129,7 @@ def test_a_trained_policy_plays_as_in_the_evaluation(setting, tmp_path):
         player = players.trained(folder, stand, greedy)
         for _ in range(3):
             stand.step(player(stand))
-        policy, weights = protocol.load_agent(folder), np.array([[0.25, 0.75]])
+        policy, weights = protocol.load_policy(folder), np.array([[0.25, 0.75]])
         returns, _ = play(task, task.make_lockstep(1), policy, weights, [setting.seed], np.array([greedy]))
         assert stand.returns == pytest.approx(returns[0])
 

@@ -159,7 +159,7 @@ def run(tmp_path, monkeypatch):
         return pd.DataFrame(rows)
 
     monkeypatch.setattr(protocol, "evaluate", evaluate)
-    monkeypatch.setattr(protocol, "load_agent", lambda folder: None)
+    monkeypatch.setattr(protocol, "load_policy", lambda folder: None)
     monkeypatch.setattr(generalisation.reference, "reference_returns", plans)
     monkeypatch.setattr(generalisation.open_loop, "fingerprint", lambda: "physics")
     monkeypatch.setattr(paths, "studies", lambda: tmp_path / "studies")

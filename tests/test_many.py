@@ -90,6 +90,15 @@ def test_a_policy_sees_what_an_environment_shows():
     np.testing.assert_allclose(first[1, names.index(f"site_{sim.OBSERVED_SITE_PARAMETERS[0]}") :], shares, rtol=1e-6)
 
 
+def test_a_policy_that_ships_is_taken_as_it_is_loaded():
+    pytest.importorskip("torch")
+    from cleanrl_style.protocol import load_policy
+
+    policy = load_policy("ppo_group-balanced")
+    found = sim.simulate_many(table(2), policy, years=2, others="sampled", **boreal_env.BALANCED_WORLD, **COARSE)
+    assert (found.planted_stems_ha > 0).any()
+
+
 def test_a_fixed_strategy_and_wrong_answers():
     from baselines_heuristic import plus_100, target_density
 

@@ -177,7 +177,7 @@ def test_a_search_leaves_a_run_and_goes_on_to_the_same_bytes(env_id, vectorizati
     assert episodes.site_seed.nunique() == 2 and len(episodes) == 36
     config = json.loads((whole / "config.json").read_text())
     task = protocol.Task.of(env_id)
-    again, _ = protocol.evaluate(task, protocol.load_agent(whole), config["arguments"]["eval_weights"], 2)
+    again, _ = protocol.evaluate(task, protocol.load_policy(whole), config["arguments"]["eval_weights"], 2)
     pd.testing.assert_frame_equal(pd.read_csv(whole / "evaluation.csv"), again, rtol=1e-6, check_dtype=False)
 
 

@@ -242,7 +242,7 @@ def test_a_loaded_agent_observes_as_in_training(tmp_path):
     agent = torch.load(tmp_path / "policy.pt", weights_only=True)["agent"]
     assert 0.4 < agent["observation_mean"][0] < 0.6 and 0.2 < agent["observation_std"][0] < 0.4
     written = pd.read_csv(tmp_path / "evaluation.csv")
-    again, _ = protocol.evaluate(protocol.Task.of(TOY), protocol.load_agent(tmp_path), (0, 1), 2)
+    again, _ = protocol.evaluate(protocol.Task.of(TOY), protocol.load_policy(tmp_path), (0, 1), 2)
     pd.testing.assert_frame_equal(written, again, rtol=1e-8, check_dtype=False)
 
 

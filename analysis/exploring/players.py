@@ -67,7 +67,7 @@ def trained(folder: str, stand: Stand, greedy: bool) -> Player:
     observation.
     """
     try:
-        policy = protocol.load_agent(folder)
+        policy = protocol.load_policy(folder)
     except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError) as error:
         raise ValueError(f"{folder}: its policy.pt or config.json cannot be read") from error
 

@@ -1,6 +1,6 @@
 """What a policy plants over the boreal zone, and what that does to thaw depth and carbon against doing nothing.
 
-    python analysis/studies/boreal_map.py --policy runs/ppo_group/boreal-balanced-v0-vectorization=lockstep/seed1
+    python analysis/studies/boreal_map.py --policy ppo_group-balanced
 
 A stand on every land point of a grid over the latitudes that sites are sampled from, simulated twice by
 `sim.simulate_many`, with and without the policy, under the same weather and dice. Climate follows latitude as for
@@ -9,8 +9,8 @@ Leaves results/studies/boreal_map.csv, a row a point, and docs/images/boreal_map
 runs/boreal_map, and the same command goes on where it was killed.
 """
 
+import contextlib
 import importlib
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,11 +41,11 @@ class Args:
     """Maps what a policy plants, and what that does."""
 
     policy: str
-    """folder of a finished run, or a fixed strategy of baselines_heuristic, such as plus_100"""
+    """folder of a run, a policy that ships (ppo_group-balanced), or a strategy of baselines_heuristic (plus_100)"""
     preference: float = 0.5
     """weight of carbon"""
     env_id: str | None = None
-    """world of the stands (None: the run's; of a fixed strategy boreal-balanced-v0)"""
+    """world of the stands (None: the policy's; of a fixed strategy boreal-balanced-v0)"""
     climate: Path | None = None
     """NetCDF file or zarr store of gridded climate (None: by latitude), see sim.sites_on_grid"""
     spacing: float = 0.5
@@ -60,18 +60,16 @@ class Args:
 
 def policy_of(args: Args) -> tuple[str, str, Callable]:
     """Name, environment and function of a policy."""
-    folder = Path(args.policy)
-    if (folder / "config.json").exists():
+    with contextlib.suppress(FileNotFoundError):
+        policy = protocol.load_policy(args.policy)
         import torch
 
         torch.set_num_threads(1)  # sums are in one order, whatever the machine; the network is small
-        config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
-        seed, env_id = config["arguments"]["seed"], config["arguments"]["env_id"]
-        return f"{config['script']}-seed{seed}", args.env_id or env_id, protocol.load_agent(folder)
+        return f"{policy.script}-seed{policy.arguments['seed']}", args.env_id or policy.env_id, policy
     try:
         module = importlib.import_module(f"baselines_heuristic.{args.policy}")
     except ModuleNotFoundError:
-        protocol.fail(f"--policy {args.policy}: neither a run's folder nor a fixed strategy")
+        protocol.fail(f"--policy {args.policy}: neither a run's folder, nor a policy that ships, nor a fixed strategy")
     return args.policy, args.env_id or BALANCED, module.policy
 
 
@@ -146,13 +144,16 @@ def sentences(table: pd.DataFrame, preference: float, years: int) -> str:
     """The answer."""
     planted, mean = table.planted_stems_ha_yr, table.mean()
     conifers = (planted * table.conifer_share).sum() / max(planted.sum(), 1e-9)
-    thaw, carbon = mean.thaw_depth_change_m, mean.carbon_change_kgc_m2
-    shallower = (table.thaw_depth_change_m < 0).mean()
+    thaw, carbon = table.thaw_depth_change_m, mean.carbon_change_kgc_m2
+
+    def change(metres):
+        return f"{abs(metres):.2f} m {'shallower' if metres < 0 else 'deeper'}"
+
     return (
         f"At a carbon weight of {preference:g} the policy plants {planted.mean():.0f} stems/ha a year, {conifers:.0%} "
-        f"of them conifers. After {years} years thaw is {abs(thaw):.2f} m {'shallower' if thaw < 0 else 'deeper'} than "
-        f"without it, as a mean of {len(table):,} stands ({shallower:.0%} of them thaw less deep), and a stand has "
-        f"{abs(carbon):.1f} kgC/m2 {'more' if carbon > 0 else 'less'}."
+        f"of them conifers. After {years} years thaw is {change(thaw.mean())} than without it in the mean of "
+        f"{len(table):,} stands, {change(thaw.median())} in the middle one ({(thaw < 0).mean():.0%} thaw less deep); a "
+        f"stand has {abs(carbon):.1f} kgC/m2 {'more' if carbon > 0 else 'less'}."
     )
 
 

@@ -209,7 +209,7 @@ def strategy(name: str):
 def agent_policy(folder: Path, config: dict):
     """A run's agent as a policy of the evaluation, and arguments of the environment that give what it observes."""
     kwargs = {"observation_groups": WITHOUT_SITE} if config["arguments"].get("hide_site", False) else {}
-    return protocol.load_agent(folder), kwargs
+    return protocol.load_policy(folder), kwargs
 
 
 # ------------------------------------------------------------------------------------------------- the table

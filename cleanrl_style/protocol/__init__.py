@@ -7,7 +7,7 @@ it is (`make_task`), opens its folder (`Run`), trains on `run.make_envs()`, logs
 """
 
 from cleanrl_style.flags import FIRST_EVALUATION_SEED, LIMITS, MAX_ENVS, fail, parse
-from cleanrl_style.protocol.agents import Policy, load_agent, load_policy, shipped_policies
+from cleanrl_style.protocol.agents import Policy, load_policy, shipped_policies
 from cleanrl_style.protocol.arguments import make_task, not_default
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.evaluation import POLICIES, evaluate
@@ -38,7 +38,6 @@ __all__ = [
     "fail",
     "final_info",
     "flat_parameters",
-    "load_agent",
     "load_policy",
     "make_task",
     "not_default",

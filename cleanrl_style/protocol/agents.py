@@ -21,7 +21,7 @@ FOLDER, FILE = "policies", "policy.pt"  # of those that ship; in a run's folder
 
 @dataclass(frozen=True)
 class Policy:
-    """A trained policy: `act` gives its actions, `probabilities` all that it says."""
+    """A trained policy: `act` gives its actions. Called, it gives their probabilities, as evaluations want them."""
 
     name: str
     script: str  # that trained it, with these arguments
@@ -29,6 +29,10 @@ class Policy:
     probabilities: Callable  # of observations (n, d), masks (n, 25), accrued returns (n, m): probabilities (n, 25)
     size: int  # d, entries of the observation
     looks_back: bool  # whether it needs the returns accrued so far, as EUPG does
+
+    def __call__(self, observations, masks, accrued_returns):
+        """Probabilities (n, 25) for observations (n, d), masks (n, 25) and accrued returns (n, m)."""
+        return self.probabilities(observations, masks, accrued_returns)
 
     def act(self, observation, mask, accrued_returns=None, generator: np.random.Generator | None = None):
         """The most probable action of an observation (d,) as an int, or of several (n, d) as an array (n,).
@@ -100,11 +104,6 @@ def load_policy(run_or_name, script=None) -> Policy:
     unknown = np.full((1, _objectives(run["arguments"])), np.nan)
     looks_back = bool(np.isnan(probabilities(np.zeros((1, size), np.float32), np.ones((1, 25), bool), unknown)).any())
     return Policy(str(run_or_name), run["script"], run["arguments"], probabilities, size, looks_back)
-
-
-def load_agent(run_folder, script=None) -> Callable:
-    """The policy of a run as the evaluation plays it: `load_policy(run_folder, script).probabilities`."""
-    return load_policy(run_folder, script).probabilities
 
 
 def _objectives(arguments: dict) -> int:

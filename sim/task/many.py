@@ -101,7 +101,7 @@ def simulate_many(
     actions : integer in [0, 25) for every year (12 changes nothing); a yearly plan, shape (years,), or one for each
         site, shape (sites, years); or a policy: a function of observations (n, d) and valid actions (n, 25), and of
         accrued returns (n, objectives) if it asks for a third, which gives actions (n,) or their probabilities (n, 25),
-        of which the largest is taken. It has no memory. An agent of `cleanrl_style.protocol.load_agent` is one.
+        of which the largest is taken. It has no memory. One of `cleanrl_style.protocol.load_policy` is such.
     path : zarr store to write; the same command goes on where it was killed. None keeps everything in memory.
     seed : of first state, weather and disturbances of row k is seed + k, unless the table has a column `seed`.
     others : site parameters that the table lacks: "middle" of their ranges, or "sampled" as an episode samples them.
