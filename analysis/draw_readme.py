@@ -1,9 +1,8 @@
-"""Draws the README's pictures: a stand after 35 years, and fifty years of a policy as an animation.
+"""Draws the pictures of README.md and docs/start.md: a stand after 35 years, and fifty years of a trained policy.
 
-    python analysis/draw_readme.py [--run-dir runs/ppo_group/boreal-balanced-v0-vectorization=lockstep/seed1]
+    python analysis/draw_readme.py [--policy ppo_group-balanced]
 
-The stand is planted for twelve years and then left alone. The animation is of conifer restoration, or of the trained
-policy of a run, which plays the same site and weather.
+The stand is planted for twelve years and then left alone; the policy plays the same site and weather.
 """
 
 from pathlib import Path
@@ -14,58 +13,46 @@ import tyro
 from PIL import Image
 
 import boreal_env
-from analysis.experiments import GENERALIST
-from baselines_heuristic import conifer_restoration
+from analysis.experiments import BALANCED
 from cleanrl_style import protocol
 from cleanrl_style.protocol import command_line
 
-SEED, YEARS, PLANTING_YEARS = 11, 35, 12
+SEED, YEARS, PLANTING_YEARS = 7, 35, 12
 PLANT_100_HALF_CONIFER = 22
 
 
 def stand() -> Image.Image:
     """A stand 35 years after the first trees were planted."""
-    env = gym.make(GENERALIST, render_mode="rgb_array")
+    env = gym.make(BALANCED, render_mode="rgb_array")
     env.reset(seed=SEED, options={"preference": 0.5})
     for year in range(YEARS):
         env.step(PLANT_100_HALF_CONIFER if year < PLANTING_YEARS else boreal_env.NO_CHANGE)
     return Image.fromarray(env.render())
 
 
-def main(run_dir: Path | None = None, preference: float = 0.5, images: Path = Path("docs/images")) -> None:
-    """Draw stand.png and conifer_restoration.gif; with a run, its policy as trained_policy.gif instead.
+def main(policy: str = "ppo_group-balanced", preference: float = 0.5, images: Path = Path("docs/images")) -> None:
+    """Draw stand.png and trained_policy.gif.
 
     Args:
-        run_dir: folder of a training run, whose agent is played
+        policy: name of one that ships, or folder of a training run
         preference: weight of carbon in the animation
         images: folder of the pictures
     """
-    images.mkdir(parents=True, exist_ok=True)
-    if run_dir is None:
-        with protocol.replacing(images / "stand.png") as file:
-            stand().save(file, format="png")
-
-        def act(observation, mask, accrued_returns):
-            return int(conifer_restoration.policy(observation[None], mask[None])[0])
-
-        env, name = gym.make(GENERALIST, render_mode="rgb_array"), "conifer_restoration"
-    else:
-        policy, generator = trained_policy(run_dir), np.random.default_rng(SEED)
-
-        def act(observation, mask, accrued_returns):
-            return policy.act(observation, mask, accrued_returns, generator)
-
-        env, name = policy.task().make(render_mode="rgb_array"), "trained_policy"
-    frames, _ = command_line.play(env, act, SEED, np.array([preference, 1 - preference]))
-    command_line.save_animation(images / f"{name}.gif", frames)
-
-
-def trained_policy(run_dir: Path) -> protocol.Policy:
-    """The policy of a run."""
     try:
-        return protocol.load_policy(run_dir)
+        trained = protocol.load_policy(policy)
     except FileNotFoundError as error:
-        protocol.fail(f"--run-dir {run_dir}: {error}")
+        protocol.fail(f"--policy {error}")
+    images.mkdir(parents=True, exist_ok=True)
+    with protocol.replacing(images / "stand.png") as file:
+        stand().save(file, format="png")
+    generator = np.random.default_rng(SEED)
+
+    def act(observation, mask, accrued_returns):
+        return trained.act(observation, mask, accrued_returns, generator)
+
+    env = trained.task().make(render_mode="rgb_array")
+    frames, _ = command_line.play(env, act, SEED, np.array([preference, 1 - preference]))
+    command_line.save_animation(images / "trained_policy.gif", frames)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from PIL import Image
 import boreal_env
 from analysis import draw_readme
 from cleanrl_style import ppo_curriculum
+from cleanrl_style.protocol import load_policy
 from cleanrl_style.protocol.command_line import FRAME_SIZE, save_animation
 from sim.task.picture import HEIGHT, WIDTH, preference, return_charts, view_of
 
@@ -120,7 +121,7 @@ def test_the_policy_of_a_run_is_played(tmp_path):
     torch.save(saved, tmp_path / "policy.pt")
     config = {"script": "ppo_curriculum", "arguments": {"env_id": "boreal-site-specific-v0"}}
     (tmp_path / "config.json").write_text(json.dumps(config))
-    policy = draw_readme.trained_policy(tmp_path)
+    policy = load_policy(tmp_path)
     assert policy.env_id == "boreal-site-specific-v0" and not policy.looks_back
     masks = np.zeros((2, 25), bool)
     masks[0, 3] = masks[1, 24] = True
@@ -128,8 +129,8 @@ def test_the_policy_of_a_run_is_played(tmp_path):
 
 
 def test_a_folder_without_a_policy_is_refused(tmp_path):
-    with pytest.raises(SystemExit, match="neither the folder of a finished run"):
-        draw_readme.trained_policy(tmp_path)
+    with pytest.raises(SystemExit, match="--policy .*: neither the folder of a finished run"):
+        draw_readme.main(policy=str(tmp_path))
 
 
 def timber(year):

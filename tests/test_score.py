@@ -1,9 +1,12 @@
 """Gains, the score, the returns that it is measured by, and what a run says of them at its end."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 
+import sim
 from cleanrl_style import protocol
 from cleanrl_style.protocol import reference, score, summary
 
@@ -161,6 +164,7 @@ def test_the_fingerprint_is_of_what_numbers_depend_on(task, monkeypatch):
     source = reference.bare('"""Of x."""\n\nx = "# 1"  # one\n\n\ndef f():\n    """Two."""\n    return x\n')
     assert source == 'x = "# 1"\ndef f():\n    return x'
     assert reference.bare("x = 1\n") != reference.bare("x = 2\n")
+    assert all((Path(sim.__file__).parent / name).exists() for name in reference.NO_PHYSICS)
 
 
 def test_the_same_returns_have_the_same_bytes(tmp_path):

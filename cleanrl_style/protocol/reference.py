@@ -35,6 +35,8 @@ PLUS_100 = "22"  # the paper's: half conifers
 PLANS = (NOTHING, *(str(action) for action in range(25) if not 10 <= action < 15))
 FOLDER = "reference"
 FLOAT_FORMAT = "%.6g"
+# Of the simulator, what reads, draws, sends or plays, and makes no number of a year.
+NO_PHYSICS = ("executor.py", "io", "task/fronts.py", "task/grid.py", "task/many.py", "task/picture.py")
 
 
 def title(plan: str) -> str:
@@ -57,9 +59,11 @@ def fingerprint(task: Task) -> str:
 
 @functools.cache
 def source() -> str:
-    """Hash of source and tables of simulator and environment."""
+    """Hash of source and tables of simulator and environment, but for `NO_PHYSICS`."""
     simulator, digest = Path(str(files("sim"))), hashlib.sha256()
-    for path in [Path(boreal_env.__file__), *sorted(simulator.rglob("*.py"))]:
+    apart = [simulator / name for name in NO_PHYSICS]
+    sources = [path for path in sorted(simulator.rglob("*.py")) if not {path, *path.parents} & set(apart)]
+    for path in [Path(boreal_env.__file__), *sources]:
         digest.update(bare(path.read_text(encoding="utf-8")).encode())
     for path in sorted(simulator.rglob("*.csv")):
         digest.update(path.read_bytes())

@@ -44,7 +44,10 @@ def plans_of(arguments: dict, seed: int | None, registered: dict[str, dict]) -> 
     given = {name: value for name, value in arguments.items() if name not in FREE}
     env_id = next((env_id for env_id in known if registered[env_id] == given), None)
     if env_id is None:
-        raise ValueError(f"pareto_front: only {', '.join(known)} have published fronts, with no argument changed")
+        raise ValueError(
+            f"pareto_front: published fronts are those of {', '.join(known) or 'no environment yet'}, with no argument "
+            "changed"
+        )
     plans = published_plans(env_id)
     if seed not in plans:
         raise ValueError(

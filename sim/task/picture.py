@@ -419,7 +419,7 @@ def draw_years(figure, view: View) -> None:
 
     layers = [
         ("soil", "soil_kgc_m2", SOIL),
-        ("dead wood", "deadwood_kgc_m2", DEADWOOD),
+        ("dead", "deadwood_kgc_m2", DEADWOOD),
         ("trees", "biomass_kgc_m2", BIOMASS),
         ("products", "hwp_kgc_m2", PRODUCTS),
     ]
@@ -465,9 +465,9 @@ def _areas(ax, years, layers) -> None:
         ncols=len(layers),
         fontsize=SMALL - 0.5,
         frameon=False,
-        handlelength=0.8,
-        handletextpad=0.3,
-        columnspacing=0.7,
+        handlelength=0.7,
+        handletextpad=0.25,
+        columnspacing=0.5,
         borderpad=0.0,
         labelcolor=INK,
     )
