@@ -6,7 +6,17 @@ In one year of an episode a stand takes one of two actions; site, past, coming w
 are the same in both. The difference of what follows is the action's effect, free of noise but for what differs between
 sites and weathers; the spread of the same sums between episodes is the noise in which a policy gradient has to find
 it. Leaves results/studies/signal_to_noise.csv, one row a case, objective and weighting of the years to come, and
-results/studies/signal_to_noise_years.csv, the effect year by year. docs/learning.md says how to read them.
+results/studies/signal_to_noise_years.csv, the effect year by year. docs/learning.md says what it is for.
+
+Columns: `effect`, mean over the sites of the difference of the return to go; `rms_effect`, its root mean square over
+the pairs; `noise`, standard deviation of the return to go over sites, pasts and weathers; `site_noise`, about each
+site's mean; `state_noise`, about the mean of each site and past; `episodes`, `site_episodes` and `state_episodes`,
+what each noise makes of the effect; `weighting` of the rewards to come: `return` 1 each, `discounted` 0.99 to the
+number of years, `GAE` (0.99 * 0.95) to it; `carried`, the effect under a weighting over the undiscounted, none where
+that cannot be told from nothing; `years_0_5` and so on, shares of the effect, signs aside, by the years after the
+action. Ends `_low` and `_high` are 95 % intervals, a bootstrap over the sites; `inf` where the effect's interval
+includes none. Year `every` is either action in every year, against the noise of a whole episode. A pair counts where
+both actions are valid.
 """
 
 from dataclasses import dataclass
