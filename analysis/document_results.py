@@ -281,6 +281,7 @@ EXCERPTS = {
     "times": excerpts.times,
     "misses": excerpts.missing,
     "knowing_the_site": excerpts.knowing_the_site,
+    "gradient": excerpts.gradient,
 }
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 
 from analysis import paths, stored
 from analysis.studies import boreal_map as region_map
-from analysis.studies import site_choice
+from analysis.studies import gradient_noise, site_choice
 from cleanrl_style import protocol
 
 VALIDATION = Path("docs/validation.md")
@@ -130,6 +130,28 @@ def knowing_the_site() -> str:
     header = ["task", "one plan for all sites", "the best of each site, on the dice that judge it"]
     header += ["the best of each site, on other dice", "conifers less deciduous, thaw", "its deviation between sites"]
     return markdown([*header, "between dice of a site"], rows)
+
+
+def gradient() -> str:
+    """How many episodes a gradient needs, as EUPG takes it and as Group PPO does; gradient_noise.csv has the rest."""
+    path = paths.studies() / "gradient_noise.csv"
+    if not path.exists():
+        return "Not run yet: `python analysis/studies/gradient_noise.py`.\n"
+    table = stored.read(path)
+    needed = table[table.utility == "future"].set_index(["baseline", "objective"])
+
+    def episodes(baseline, objective="preference"):
+        row = needed.loc[baseline, objective]
+        return f"{row.episodes:,.0f} [{row.episodes_low:,.0f}, {row.episodes_high:,.0f}] episodes"
+
+    return (
+        f"At the start of a training EUPG's gradient has as much signal as noise after "
+        f"{episodes(gradient_noise.NONE)}; less the mean of all other episodes after "
+        f"{episodes(gradient_noise.MEAN)}; less that of the seven others of the same site, start and weather, as in "
+        f"Group PPO, after {episodes(gradient_noise.SITE)}. Of thaw alone it is "
+        f"{episodes(gradient_noise.NONE, 'thaw')} and {episodes(gradient_noise.SITE, 'thaw')}. "
+        "A training has 6,000 episodes.\n"
+    )
 
 
 def first_run() -> str:

@@ -138,3 +138,4 @@ def test_what_ships_is_of_published_sites():
         plans = fronts.published_plans(env_id)
         assert set(plans) <= set(protocol.evaluation_seeds(protocol.Task.of(env_id), 200)) or not plans
         assert all(np.isin(one, best_plans.ACTIONS).all() for one in plans.values())
+        assert len(plans) == (50 if env_id in best_plans.Args.env_id else 0)
