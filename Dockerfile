@@ -2,7 +2,7 @@
 #
 #     docker build -t borearl .
 #     docker run --rm -v "$PWD/runs:/borearl/runs" borearl             # train, evaluate, score
-#     docker run --rm borearl pytest                                   # all tests
+#     docker run --rm borearl pytest                                   # all tests but the slow ones
 FROM python:3.11-slim
 
 WORKDIR /borearl

@@ -15,6 +15,7 @@ from cleanrl_style.protocol.arguments import DEFAULT_STEPS
 
 ROOT = Path(__file__).parents[1]
 GENERALIST, BALANCED, ONE_SITE = "boreal-generalist-v0", "boreal-balanced-v0", "boreal-site-specific-v0"
+OTHER_WORLDS = ("boreal-timber-v0", "boreal-four-v0", "boreal-warming-v0")
 STUDIES = (
     "constant_plans",
     "training_gains",
@@ -182,6 +183,13 @@ def planners(seeds) -> list[Job]:
     ]
 
 
+def other_worlds(seeds) -> list[Job]:
+    """Group PPO with three and four objectives, and in a climate that warms."""
+    return [
+        trained("worlds", "ppo_group", seed, env_id=env_id) for seed in seeds_of(5, seeds) for env_id in OTHER_WORLDS
+    ]
+
+
 def fixed_weights(seeds) -> list[Job]:
     """EUPG trained for one weight, on all sites."""
     return [
@@ -301,6 +309,7 @@ EXPERIMENTS = {
     "group": Experiment(group, "group PPO with one choice changed, such as the size of groups"),
     "outside": Experiment(outside, "algorithms of other libraries, on both tasks"),
     "planners": Experiment(planners, "NSGA-II and MOEA/D over a small policy, on both tasks"),
+    "worlds": Experiment(other_worlds, "group PPO with three and four objectives, and in a climate that warms"),
     "fixed": Experiment(fixed_weights, "learning asymmetry: EUPG with a fixed weight, one run a weight and seed"),
     "site": Experiment(single_sites, "the same on single sites, one run a weight and site"),
     "thaw": Experiment(thaw_formulations, "the thaw reward's formulations: gated PPO"),

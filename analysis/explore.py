@@ -273,6 +273,8 @@ def main(port: int = 5006, show: bool = True, runs: Path = Path("runs")) -> None
         runs: folder of runs, whose trained policies can be chosen
     """
 
+    if not 0 < port < 65536:
+        protocol.fail(f"--port {port}: 1 to 65535 are allowed")
     pn.extension(sizing_mode="stretch_width", raw_css=[style.BODY])
 
     def page():

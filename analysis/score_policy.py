@@ -12,6 +12,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pandas as pd
 import tyro
@@ -88,9 +89,7 @@ def add(row: dict, root: Path) -> None:
     table = table.sort_values([f"greedy, {TASKS[1]}", "name"], ascending=[False, True])
     page = (root / PAGE).read_text(encoding="utf-8")
     cells = [[f"{v:.0f}" if isinstance(v, float) else str(v) for v in line] for line in table.itertuples(index=False)]
-    text, count = SECTION.subn(lambda match: match[1] + markdown(COLUMNS, cells) + match[2], page)
-    if not count:
-        raise ValueError(f"{root / PAGE}: no <!-- leaderboard --> to <!-- end of leaderboard -->")
+    text = SECTION.sub(lambda match: match[1] + markdown(COLUMNS, cells) + match[2], page)
     with protocol.replacing(root / TABLE) as file:
         table.to_csv(file, index=False, float_format="%.4g", lineterminator="\n")
     with protocol.replacing(root / PAGE) as file:
@@ -100,6 +99,10 @@ def add(row: dict, root: Path) -> None:
 def main(args: Args) -> None:
     """Check, score, and add."""
     try:
+        if not 1 <= args.episodes <= 200:
+            raise ValueError(f"--episodes {args.episodes}: 1 to 200 are allowed")
+        if args.add and not SECTION.search((args.root / PAGE).read_text(encoding="utf-8")):
+            raise ValueError(f"{args.root / PAGE}: no <!-- leaderboard --> to <!-- end of leaderboard -->")
         if args.add and (set(args.tasks) != set(TASKS) or args.episodes != 200):
             raise ValueError("--add: a row of the leaderboard is of both tasks and all 200 test sites")
         policy = protocol.load_policy(args.policy, args.script)
@@ -120,7 +123,7 @@ def main(args: Args) -> None:
         if args.add:
             add(row, args.root)
             print(f"wrote {args.root / TABLE} and {args.root / PAGE}")
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, gym.error.Error) as error:
         sys.exit(f"error: {error}")
 
 

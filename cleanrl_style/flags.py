@@ -60,10 +60,10 @@ def describe(arguments: type) -> str:
 
     python {sys.argv[0]} --vectorization lockstep --total-timesteps 32000 --eval-episodes 20
 
-is a trial of a minute on two cores. Without the last two flags it trains for 300,000 steps and is evaluated on 200
-sites, for ten minutes. A stopped run goes on with the same command, to the same bytes. The folder gets config.json,
-episodes.csv, updates.csv, validation.csv, evaluation.csv, policy.pt and summary.png, which docs/algorithms
-explains; python analysis/make_tables.py sets it beside other runs."""
+is a trial: a minute on two cores once the physics is compiled. Without the last two flags it trains for 300,000
+steps and is evaluated on 200 sites, for ten minutes. A stopped run goes on with the same command, to the same
+bytes. The folder gets config.json, episodes.csv, updates.csv, validation.csv, evaluation.csv, policy.pt and
+summary.png, which docs/algorithms explains; python analysis/make_tables.py sets it beside other runs."""
 
 
 def parse(arguments: type):

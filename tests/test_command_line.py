@@ -66,6 +66,10 @@ def test_a_policy_acts(run):
     assert len(drawn) > 3
     with pytest.raises(ValueError, match=r"observations \(n, 43\) and masks \(n, 25\) are allowed, got \(1, 3\)"):
         policy.act(np.zeros(3), mask)
+    with pytest.raises(ValueError, match="an observation is not finite"):
+        policy.act(observation * np.nan, mask)
+    with pytest.raises(ValueError, match="a mask has no valid action"):
+        policy.act(observation, mask & False)
 
 
 def test_a_policy_is_watched(shipped, tmp_path, capsys, monkeypatch):
@@ -85,6 +89,8 @@ def test_a_policy_is_watched(shipped, tmp_path, capsys, monkeypatch):
         (["watch", "{run}", "--preference", "2"], r"--preference: a number in \[0, 1\] is allowed, got 2.0"),
         (["watch", "{run}", "--env-id", "boreal-balanced-v0"], "observes 43 entries, boreal-balanced-v0 has 105"),
         (["watch", "{run}", "--env-id", "boral-v0"], "boral"),
+        (["watch", "{run}", "--out", "/nowhere/years.gif"], "--out /nowhere/years.gif: there is no folder /nowhere"),
+        (["watch", __file__], "no policy that a script of this project has written"),
         (["wach"], "invalid choice: 'wach'"),
     ],
 )
@@ -110,6 +116,10 @@ def test_a_policy_that_does_not_play_its_evaluation_is_refused(run, tmp_path):
         score_policy.main(score_policy.Args(tmp_path, tasks=("boreal-site-specific-v0",), episodes=1))
     with pytest.raises(SystemExit, match="--add: a row of the leaderboard"):
         score_policy.main(score_policy.Args(run, episodes=1, add=True))
+    with pytest.raises(SystemExit, match="--episodes 0: 1 to 200 are allowed"):
+        score_policy.main(score_policy.Args(run, episodes=0))
+    with pytest.raises(SystemExit, match="boral"):
+        score_policy.main(score_policy.Args(run, tasks=("boral-v0",), episodes=1))
 
 
 def test_rows_go_into_the_leaderboard(tmp_path):

@@ -17,6 +17,7 @@ COUNTS = {
     "group": 40,
     "outside": 10 * len(methods.OUTSIDE),
     "planners": 20,
+    "worlds": 15,
     "fixed": 25,
     "site": 45,
     "thaw": 12,

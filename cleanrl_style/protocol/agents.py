@@ -3,6 +3,7 @@
 import importlib
 import importlib.util
 import json
+import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
@@ -46,6 +47,10 @@ class Policy:
                 f"{self.name}: observations (n, {self.size}) and masks (n, 25) are allowed, got "
                 f"{observations.shape} and {masks.shape}"
             )
+        if not np.isfinite(observations).all():
+            raise ValueError(f"{self.name}: an observation is not finite")
+        if not masks.any(axis=1).all():
+            raise ValueError(f"{self.name}: a mask has no valid action")
         if accrued_returns is None and self.looks_back:
             raise ValueError(f"{self.name} looks at the returns accrued so far: give accrued_returns")
         accrued = np.zeros((len(masks), 0)) if accrued_returns is None else np.atleast_2d(accrued_returns)
@@ -89,8 +94,14 @@ def load_policy(run_or_name, script=None) -> Policy:
             f"{run_or_name}: neither the folder of a finished run, with {FILE}, nor such a file, nor a policy that "
             f"ships ({', '.join(ships) or 'none does yet'})"
         )
-    saved = torch.load(path, weights_only=True)
-    run = saved.get("run") or json.loads((path.parent / "config.json").read_text(encoding="utf-8"))
+    try:
+        saved = torch.load(path, weights_only=True)
+        run = saved.get("run") or json.loads((path.parent / "config.json").read_text(encoding="utf-8"))
+        saved["agent"], saved["arguments"], saved["observation_shape"], run["script"]
+    except (pickle.UnpicklingError, EOFError, RuntimeError, AttributeError, KeyError, json.JSONDecodeError) as error:
+        raise ValueError(f"{path}: no policy that a script of this project has written") from error
+    except FileNotFoundError as error:
+        raise FileNotFoundError(f"{path}: config.json of its run has to lie beside it") from error
     module = _script_module(run["script"], script)
     space = Box(-np.inf, np.inf, tuple(saved["observation_shape"]), np.float32)
     agent = module.Agent(SimpleNamespace(single_observation_space=space), **saved["arguments"])

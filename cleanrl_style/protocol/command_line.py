@@ -12,6 +12,7 @@ import gymnasium as gym
 import numpy as np
 
 import boreal_env
+from cleanrl_style.flags import prepare_output, require
 from cleanrl_style.protocol.agents import Policy, load_policy, shipped_policies
 from cleanrl_style.protocol.arguments import fail
 from cleanrl_style.protocol.compilation import compile_physics
@@ -42,7 +43,7 @@ def overview() -> str:
             "Environments, for gymnasium.make after `import boreal_env`:",
             *(f"  {name:{width}}  {words}" for name, words in ENVIRONMENTS.items()),
             "",
-            "Train, in a checkout of the project (--help has the flags and a trial of a minute):",
+            "Train, in a checkout of the project (--help has the flags and a short trial):",
             "  python cleanrl_style/ppo_group.py --vectorization lockstep --env-id boreal-balanced-v0",
             "",
             "Watch fifty years of a trained policy:",
@@ -136,6 +137,9 @@ def show(frames: list[np.ndarray]) -> None:
 
 def watch(args: argparse.Namespace) -> None:
     """Play the policy, say what it returned beside doing nothing, and show its years."""
+    seed = check_seed("--seed", args.seed)
+    if args.out is not None and not args.out.absolute().parent.is_dir():
+        raise ValueError(f"--out {args.out}: there is no folder {args.out.parent}")
     policy = load_policy(args.policy)
     env = make_env(policy, args.env_id, args.site_seed)
     names = env.unwrapped.objective_names
@@ -143,7 +147,6 @@ def watch(args: argparse.Namespace) -> None:
     weights = check_weights(given[0] if len(given) == 1 else given, len(names), "--preference")
     generator = np.random.default_rng([args.seed, 1]) if args.sampled else None
     compile_physics([1])
-    seed = check_seed("--seed", args.seed)
     frames, returns = play(env, lambda *given: policy.act(*given, generator=generator), seed, weights)
     env.unwrapped.render_mode = None
     _, nothing = play(env, lambda *given: boreal_env.NO_CHANGE, seed, weights)
@@ -161,10 +164,12 @@ def watch(args: argparse.Namespace) -> None:
 
 def main(argv: list[str] | None = None) -> None:
     """Run the command."""
+    prepare_output()
     args = arguments(sys.argv[1:] if argv is None else argv)
     if args.command is None:
         print(overview())
         return
+    require("torch", "matplotlib", "tyro")
     try:
         watch(args)
     except (ValueError, OSError, gym.error.Error, ImportError) as error:
