@@ -9,6 +9,7 @@ from records import ALASKA, SWEDEN
 
 import sim
 from analysis.validation import climate_records, poker_flat, tower_report
+from sim.io.check import check_forcing
 from sim.io.disaggregation import FOREST_CYCLE
 from sim.io.forcing import FLAGS
 from sim.state import FORCING
@@ -458,6 +459,13 @@ def test_rain_may_be_a_rate(unit, factor):
     rate = tower(lambda t: t.assign(P_F=t.P_F * factor))
     forcing = sim.read_forcing(rate, units={"P_F": unit}, **SWEDEN)
     np.testing.assert_allclose(forcing.precipitation_mm, sim.read_forcing(tower(), **SWEDEN).precipitation_mm)
+
+
+def test_rain_by_the_day_is_refused_of_a_forcing_of_ones_own(weather):
+    with pytest.raises(
+        ValueError, match=r"precipitation_mm is 3.5e\+04 mm a year; at most 5000 is allowed .*30 minutes"
+    ):
+        check_forcing(weather.assign(precipitation_mm=2.0), 30, 1)
 
 
 def test_a_gap_that_is_too_long_is_refused():

@@ -63,8 +63,7 @@ def open_table(source) -> Table:
 
 def check_utf8(what: str, path: Path) -> None:
     """Refuse a text file that is not UTF-8, by its line. what : how the error begins."""
-    opened = gzip.open if path.suffix == ".gz" else open
-    with opened(path, "rb") as file:
+    with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as file:
         for number, line in enumerate(file, start=1):
             try:
                 line.decode("utf-8")
