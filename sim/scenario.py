@@ -14,6 +14,7 @@ from sim.parameters import CONSTANTS
 
 FIRST_YEAR = 2025
 TABLE = "scenarios.csv"
+YEAR, LEAST_YEAR = "year", 1000
 CO2 = "co2_ppm"
 
 #: What the weather generator adds, as parameters, where no path says otherwise.
@@ -62,8 +63,10 @@ class Path:
 def check_scenario(scenario) -> Path | None:
     """A name of `SCENARIOS`, or a path of the user's, checked; None for none.
 
-    A path is a dict or a DataFrame of one or more of `COLUMNS`, each with a value for every year from the stand's first
-    on, as a sequence or as a dict by year. Raises ValueError naming the value and what is allowed.
+    A path is a dict or a DataFrame of one or more of `COLUMNS`. Its years are a column `year`, the index of a table (if
+    it is named so, or has dates or numbers from `LEAST_YEAR` on), or the keys of a dict in place of a column; what is
+    before `FIRST_YEAR` is left out. Without years the first value is that of `FIRST_YEAR`. Raises ValueError naming
+    the value and what is allowed.
     """
     if scenario is None:
         return None
@@ -77,9 +80,10 @@ def check_scenario(scenario) -> Path | None:
         raise ValueError(f"scenario {scenario!r}: allowed are None, {named}, or a dict or DataFrame of a path by year")
     columns = {}
     for name in scenario:
-        if name not in COLUMNS:
-            raise ValueError(f"unknown column {name!r} of the scenario; allowed: {', '.join(COLUMNS)}")
-        columns[name] = _check_column(name, scenario[name])
+        if name not in COLUMNS and name != YEAR:
+            raise ValueError(f"unknown column {name!r} of the scenario; allowed: {', '.join((YEAR, *COLUMNS))}")
+        if name in COLUMNS:
+            columns[name] = _check_column(name, scenario[name], scenario.get(YEAR))
     if not columns:
         raise ValueError(f"the scenario has no column; allowed: {', '.join(COLUMNS)}")
     lengths = {name: len(values) for name, values in columns.items()}
@@ -88,11 +92,11 @@ def check_scenario(scenario) -> Path | None:
     return Path(columns, f"has {lengths.popitem()[1]} years")
 
 
-def _check_column(name: str, values) -> np.ndarray:
+def _check_column(name: str, values, years) -> np.ndarray:
+    """Values of a column from `FIRST_YEAR` on. years : of the path's own column, or None."""
+    if years is None:
+        years = _years(values)
     if isinstance(values, Mapping):
-        years = list(values)
-        if not all(isinstance(year, (int, np.integer)) for year in years) or (np.diff(years) != 1).any():
-            raise ValueError(f"scenario {name}: its years have to follow each other, got {years[:3]}..")
         values = list(values.values())
     try:
         numbers = np.asarray(values, dtype=float)
@@ -100,9 +104,46 @@ def _check_column(name: str, values) -> np.ndarray:
         raise ValueError(f"scenario {name}: a number for each year is allowed, got {values!r}") from None
     if numbers.ndim != 1 or not len(numbers):
         raise ValueError(f"scenario {name}: a number for each year is allowed, got {values!r}")
+    if years is None:
+        years = FIRST_YEAR + np.arange(len(numbers))
+    else:
+        years = _check_years(name, years, len(numbers))
+        numbers = numbers[years >= FIRST_YEAR]
+        years = years[years >= FIRST_YEAR]
     low, high, unit = COLUMNS[name]
     wrong = ~((numbers >= low) & (numbers <= high))
     if wrong.any():
         k = int(np.argmax(wrong))
-        raise ValueError(f"scenario {name} = {numbers[k]:g} in year {k + 1}: [{low:g}, {high:g}] {unit} is allowed")
+        raise ValueError(f"scenario {name} = {numbers[k]:g} in {years[k]}: [{low:g}, {high:g}] {unit} is allowed")
     return numbers
+
+
+def _years(values):
+    """Years that a column has beside its values, or None."""
+    if isinstance(values, Mapping):
+        return list(values)
+    index = getattr(values, "index", None)
+    if index is None or callable(index):  # a list's index is a method
+        return None
+    dates = getattr(index, "year", None)
+    if dates is not None:
+        return dates
+    numbers = index.dtype.kind in "if"
+    return index if index.name == YEAR or (numbers and len(index) and index[0] >= LEAST_YEAR) else None
+
+
+def _check_years(name: str, given, number: int) -> np.ndarray:
+    """The years of a column as integers, one by one, with `FIRST_YEAR` among them."""
+    try:
+        years = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"scenario {name}: its years have to be integers, got {given!r}") from None
+    if years.shape != (number,):
+        raise ValueError(f"scenario {name}: {number} values of {years.size} years; a value each is allowed")
+    apart = np.flatnonzero(np.diff(years) != 1.0)
+    if (years % 1 != 0).any() or len(apart):
+        which = f"{years[apart[0] + 1]:g} after {years[apart[0]]:g}" if len(apart) else f"{years[0]:g}"
+        raise ValueError(f"scenario {name}: its years have to follow each other, got {which}")
+    if not years[0] <= FIRST_YEAR <= years[-1]:
+        raise ValueError(f"scenario {name}: its years are {years[0]:g} to {years[-1]:g}; {FIRST_YEAR} is needed, too")
+    return years.astype(int)

@@ -24,7 +24,9 @@ def daily():
 
 def test_every_column_of_both_tables_is_there(dataset):
     assert {*VARIABLES, *PROFILE} == {*DAILY, "nee_kgc_m2"}
-    assert {name for name in dataset if name.startswith("annual_")} == {f"annual_{n}" for n in (*RECORD, "nee_kgc_m2")}
+    assert {name for name in dataset if name.startswith("annual_")} == {
+        f"annual_{n.removeprefix('annual_')}" for n in (*RECORD, "nee_kgc_m2")
+    }
     names = [name for name, *_ in VARIABLES.values()]
     assert len(set(names)) == len(names) and set(names) <= set(dataset)
 
@@ -61,6 +63,7 @@ def test_units_and_attributes_are_those_of_cf(dataset):
             assert variable.attrs["units"] and variable.attrs["long_name"], name
             assert "kgC" not in variable.attrs["units"] and "stems" not in variable.attrs["units"], name
     assert dataset.GPP.attrs["standard_name"] == "gross_primary_productivity_of_biomass_expressed_as_carbon"
+    assert "at the day's end" in dataset.SWE.attrs["comment"] and "cell_methods" not in dataset.SWE.attrs
     assert dataset.time.attrs["bounds"] == "time_bnds" and dataset.depth.attrs["positive"] == "down"
 
 

@@ -97,6 +97,8 @@ def test_a_policy_that_ships_is_taken_as_it_is_loaded():
     policy = load_policy("ppo_group-balanced")
     found = sim.simulate_many(table(2), policy, years=2, others="sampled", **boreal_env.BALANCED_WORLD, **COARSE)
     assert (found.planted_stems_ha > 0).any()
+    with pytest.raises(ValueError, match="'ppo_group-balanced' is of another world: it observes 105 entries, here are"):
+        sim.simulate_many(table(2), policy, years=2, observation_groups=("state",), **COARSE)
 
 
 def test_a_fixed_strategy_and_wrong_answers():
@@ -174,18 +176,39 @@ def test_chunks_are_of_one_size_and_bounded():
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"latitude_deg": [60.0, np.nan]}, "sites: row 1, column latitude_deg is missing; a number in [45, 72] degN"),
-        ({"wind_speed_m_s": [3.0, 99.0]}, "sites: row 1, column wind_speed_m_s is 99.0; a number in [0.3, 15] m s-1"),
-        ({"relative_humidity": [70.0, 0.7]}, "sites: row 0, column relative_humidity is 70.0; a number in [0.2, 1] is"),
-        ({"wind_speed_m_s": [3.0, "calm"]}, "sites: row 1, column wind_speed_m_s is calm; a number"),
+        (
+            {"latitude_deg": [60.0, np.nan]},
+            "zero-based row 1, column latitude_deg is missing; a number in [45, 72] degN",
+        ),
+        (
+            {"wind_speed_m_s": [3.0, 99.0]},
+            "zero-based row 1, column wind_speed_m_s is 99.0; a number in [0.3, 15] m s-1",
+        ),
+        (
+            {"relative_humidity": [70.0, 0.7]},
+            "zero-based row 0, column relative_humidity is 70.0; a number in [0.2, 1] is",
+        ),
+        ({"wind_speed_m_s": [3.0, "calm"]}, "zero-based row 1, column wind_speed_m_s is calm; a number"),
         ({"latitude": [60.0, 61.0]}, "sites: unknown column 'latitude'; did you mean latitude_deg"),
-        ({"density_stems_ha": [-1.0, 0.0]}, "sites: row 0, column density_stems_ha is -1.0; a number in [0, 10000]"),
-        ({"seed": [1, 1.5]}, "sites: row 1, column seed is 1.5; an integer"),
+        ({"lat": [60.0, 61.0]}, "sites: unknown column 'lat'; did you mean latitude_deg? allowed are names of"),
+        (
+            {"density_stems_ha": [-1.0, 0.0]},
+            "zero-based row 0, column density_stems_ha is -1.0; a number in [0, 10000]",
+        ),
+        ({"seed": [1, 1.5]}, "zero-based row 1, column seed is 1.5; an integer"),
         (
             {"deep_boundary_temperature_k": [270.0, 271.0]},
             "sites: column deep_boundary_temperature_k: boundary='balanced' finds it",
         ),
         ({"conifer_old_stems_ha": [1.0, 1.0], "density_stems_ha": [1.0, 1.0]}, "stems by class exclude density"),
+        (
+            {"density_stems_ha": [400.0, 0.0], "biomass_kgc_m2": 4.0},
+            "zero-based row 1, column biomass_kgc_m2 is 4; of 0 stems/ha at most 0 kgC/m2 is allowed",
+        ),
+        (
+            {"conifer_old_stems_ha": [900.0, 1.0], "biomass_kgc_m2": 4.0},
+            "zero-based row 1, column biomass_kgc_m2 is 4; of 1 stems/ha at most 0.012 kgC/m2 is allowed, 120",
+        ),
     ],
 )
 def test_bad_tables(change, message):
@@ -283,6 +306,14 @@ def test_gridded_climate(tmp_path):
 def test_bad_climate(file, message):
     with pytest.raises(ValueError, match=message):
         sim.sites_on_grid([60.0], [20.0], climate=file)
+
+
+def test_a_climate_file_that_cannot_be_read(tmp_path):
+    (tmp_path / "text.nc").write_text("no NetCDF")
+    for name, message in (("none.nc", "climate: there is no file .*none.nc"), ("text.nc", "text.nc cannot be read")):
+        with pytest.raises(ValueError, match=message) as error:
+            sim.sites_on_grid([60.0], [20.0], climate=tmp_path / name)
+        assert "\n" not in str(error.value)
 
 
 def test_a_grid_beyond_its_climate():

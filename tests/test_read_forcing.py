@@ -9,6 +9,7 @@ from records import ALASKA, SWEDEN
 
 import sim
 from analysis.validation import climate_records, poker_flat, tower_report
+from sim.io.check import check_forcing
 from sim.io.disaggregation import FOREST_CYCLE
 from sim.io.forcing import FLAGS
 from sim.state import FORCING
@@ -152,7 +153,7 @@ def test_a_record_may_lack_29_february():
     days = pd.read_csv(records.POKER_FLAT)
     without = days[days["TIMESTAMP"] != 20120229]
     pd.testing.assert_frame_equal(sim.read_forcing(without, **ALASKA)[NAMES], sim.read_forcing(days, **ALASKA)[NAMES])
-    with pytest.raises(ValueError, match=r"no row for 2012-02-28 after the table, row 422"):
+    with pytest.raises(ValueError, match=r"no row for 2012-02-28 after the table, zero-based row 422"):
         sim.read_forcing(days[days["TIMESTAMP"] != 20120228], **ALASKA)
 
 
@@ -179,11 +180,12 @@ def test_gaps_are_filled_by_the_records_own_reanalysis_first():
     table.loc[5000:5100, "TA_F"] = -9999
     forcing = sim.read_forcing(table, gaps="fill", **SWEDEN)
     np.testing.assert_allclose(forcing.air_temperature_c.iloc[5000:5101], table["TA_ERA"].iloc[5000:5101])
-    assert (flags(forcing, "air_temperature_c")[5000:5101] == 1).all()
+    assert (flags(forcing, "air_temperature_c")[5000:5101] == 7).all()
+    assert any("filled here: by the reanalysis" in line for line in forcing.attrs["report"])
 
 
 def test_every_flag_has_a_meaning():
-    assert list(FLAGS) == list(range(7))
+    assert list(FLAGS) == list(range(8))
 
 
 @pytest.mark.parametrize("name", ["SE-Svb", "US-Prr", "FI-Sod"])
@@ -253,12 +255,12 @@ KELVIN = 273.15
 BAD = {
     "a row in kelvin": (
         with_value("TA_F", 268.4),
-        r"row 3000 \(2019-03-04 11:30\): TA_F is 268.4 degC; \[-75, 50\].*'K'",
+        r"zero-based row 3000 \(2019-03-04 11:30\): TA_F is 268.4 degC; \[-75, 50\] degC is allowed$",
     ),
     "all in kelvin": (lambda: tower(TA_F=270.0), r"row 0 .*TA_F is 270 degC.*units={'TA_F': 'K'}"),
     "Celsius for kelvin": (
         era5(lambda t: t.assign(t2m=t.t2m - KELVIN)),
-        r"row 0 .*t2m is -.* degC; .*say units={'t2m': 'degC'}",
+        r"row 0 .*t2m is -?[\d.]+ K, which is -2[\d.]+ degC; .*say units={'t2m': 'degC'}",
     ),
     "VPD in kPa": (
         lambda: tower(lambda t: t.assign(VPD_F=t.VPD_F / 10)),
@@ -268,13 +270,19 @@ BAD = {
         lambda: tower(lambda t: t.assign(VPD_F=t.VPD_F * 100)),
         r"row \d+ .*VPD_F is [\d.]+ hPa; .*say units={'VPD_F': 'Pa'}",
     ),
-    "pressure in hPa": (lambda: tower(PA_F=973.0), r"PA_F is 9730 hPa; \[500, 1100\] hPa is allowed; if it is in hPa"),
-    "pressure in Pa": (era5(lambda t: t.assign(sp=973.0)), r"sp is 9.73 hPa.*if it is in hPa"),
+    "pressure in hPa": (
+        lambda: tower(PA_F=973.0),
+        r"PA_F is 973 kPa, which is 9730 hPa; \[500, 1100\] hPa is allowed; if it is in hPa",
+    ),
+    "pressure in Pa": (era5(lambda t: t.assign(sp=973.0)), r"sp is 973 Pa, which is 9.73 hPa.*if it is in hPa"),
     "humidity as a share": (
         lambda: tower(lambda t: t.assign(RH=t.RH / 100), made=records.icos),
         r"RH in %: relative humidity is 1 % in half of all warm intervals; .*units={'RH': ..}",
     ),
-    "humidity of 140 %": (with_value("RH", 140.0, made=records.icos), r"row 3000 .*RH is 1.4; \[0, 1.1\] is allowed"),
+    "humidity of 140 %": (
+        with_value("RH", 140.0, made=records.icos),
+        r"row 3000 .*RH is 140 %, which is 1.4; \[0, 1.1\] is allowed",
+    ),
     "negative light": (
         with_value("SW_IN_F", -50.0),
         r"row 3000 .*SW_IN_F is -50 W m-2; \[-10, 1500\] W m-2 is allowed",
@@ -297,22 +305,41 @@ BAD = {
     ),
     "rain in millimetres": (
         era5(lambda t: t.assign(tp=t.tp * 1000)),
-        r"row \d+ .*tp is [\d.]+ mm; .*say units={'tp': 'mm'}",
+        r"row \d+ .*tp grows by [\d.]+ m, which is [\d.]+ mm; .*say units={'tp': 'mm'}",
+    ),
+    "rain by the day": (
+        lambda: tower(lambda t: t.assign(P_F=t.P_F * 48), days=365),
+        r"row \d+ .*P_F is [\d.]+ mm; .*if it is in mm d-1, say units={'P_F': 'mm d-1'}",
+    ),
+    "gentle rain by the day": (
+        lambda: tower(P_F=2.0, days=365),
+        r"P_F in mm: precipitation is 3.5e\+04 mm a year; .*units={'P_F': ..}, of mm, m, kg m-2 s-1, .*mm d-1$",
+    ),
+    "light with an offset": (
+        lambda: tower(lambda t: t.assign(SW_IN_F=t.SW_IN_F - 50.0)),
+        r"SW_IN_F is -[\d.]+ W m-2; \[-10, 1500\] W m-2 is allowed$",
+    ),
+    "light by photons, strong": (
+        lambda: tower(lambda t: t.assign(SW_IN_F=t.SW_IN_F * 2.02)),
+        r"SW_IN_F is [\d.]+ W m-2; \[-10, 1500\] W m-2 is allowed$",
     ),
     "text": (with_value("WS_F", "calm"), r"row 3000: WS_F is 'calm'; a number is allowed"),
     "no temperature": (
         lambda: tower(lambda t: t.drop(columns=["TA_F", "TA_ERA"])),
         r"no column for air temperature: none of TA_F, TA_F_MDS, .*columns={'air_temperature': '..'}; the record has T",
     ),
-    "nothing but -9999": (lambda: tower(made=records.icos, TA=-9999), r"no column for air temperature"),
+    "nothing but -9999": (
+        lambda: tower(made=records.icos, TA=-9999),
+        r"no number for air temperature: TA is empty, or -9999, in every row; .*columns={'air_temperature': '..'}",
+    ),
     "a gap": (with_value("SW_IN_F", np.nan), r"row 3000 .*SW_IN_F is missing \(1 of 9600 in all\); gaps='fill'"),
     "a missing row": (
         lambda: tower(lambda t: t.drop(index=3000)),
-        r"no row for 2019-03-04 12:00 solar time after the table, row 2999 \(1 of 9600",
+        r"no row for 2019-03-04 12:00 solar time after the table, zero-based row 2999 \(1 of 9600",
     ),
     "an hour twice, at the end of summer time": (
         with_times(lambda t: t - np.where(t % 10000 < 100, 7700, 100), range(5000, 5010)),
-        r"row 5000: 2019-04-15 02:30 is there twice, first in the table, row 4998",
+        r"row 5000: 2019-04-15 02:30 is there twice, first in the table, zero-based row 4998",
     ),
     "rows out of order": (
         lambda: tower(lambda t: pd.concat([t[48:96], t[:48], t[96:]], ignore_index=True)),
@@ -354,7 +381,7 @@ BAD = {
     ),
     "sums that fall": (
         era5(lambda t: t.assign(ssrd=t.ssrd.where(t.index != 3000, 0.0))),
-        r"row 3000 \(2019-05-05 23:00\): ssrd is -[\d.]+ W m-2; \[-10, 1500\] W m-2 is allowed",
+        r"row 3000 \(2019-05-05 23:00\): ssrd grows by -[\d.e+]+ J m-2, which is -[\d.]+ W m-2; \[-10, 1500\]",
     ),
     "an array": (lambda: np.zeros((3, 3)), r"a file, a DataFrame or a Dataset is allowed, got ndarray"),
     "no file": (lambda: "nowhere.csv", r"there is no file nowhere.csv"),
@@ -422,6 +449,25 @@ def test_a_unit_that_is_given_is_believed():
     assert damp.relative_humidity.min() > 0.85
 
 
+def test_no_unit_makes_light_of_what_is_none():
+    with pytest.raises(ValueError, match=r"SW_IN_F in J m-2: a clear day has 0.\d+ % .*of W m-2, J m-2"):
+        sim.read_forcing(tower(), units={"SW_IN_F": "J m-2"}, **SWEDEN)
+
+
+@pytest.mark.parametrize("unit, factor", [("mm d-1", 48.0), ("mm h-1", 2.0)])
+def test_rain_may_be_a_rate(unit, factor):
+    rate = tower(lambda t: t.assign(P_F=t.P_F * factor))
+    forcing = sim.read_forcing(rate, units={"P_F": unit}, **SWEDEN)
+    np.testing.assert_allclose(forcing.precipitation_mm, sim.read_forcing(tower(), **SWEDEN).precipitation_mm)
+
+
+def test_rain_by_the_day_is_refused_of_a_forcing_of_ones_own(weather):
+    with pytest.raises(
+        ValueError, match=r"precipitation_mm is 3.5e\+04 mm a year; at most 5000 is allowed .*30 minutes"
+    ):
+        check_forcing(weather.assign(precipitation_mm=2.0), 30, 1)
+
+
 def test_a_gap_that_is_too_long_is_refused():
     table = tower(lambda t: t.drop(index=range(4000, 4960)))
     message = r"TA_F is missing from 2019-03-25 08:00 on for 20 days; gaps of up to longest_gap_days = 14 are filled"
@@ -432,7 +478,7 @@ def test_a_gap_that_is_too_long_is_refused():
 BAD_FILES = {
     "nothing": ("", r"line 1: a row of column names is needed, got nothing"),
     "a column twice": ("TIMESTAMP,TA_F,TA_F\n20190101,1,1\n", r"line 1: column TA_F is there twice"),
-    "nothing but names": ("TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n", r"no column for air temperature|0 rows"),
+    "nothing but names": ("TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n", r"tower.csv: 0 rows; whole days"),
     "decimal commas": (
         "TIMESTAMP;TA_F;VPD_F;WS_F;SW_IN_F;P_F\n20190101;1,5;1;1;1;0\n20190102;1,5;1;1;1;0\n",
         r"line 2: TA_F is '1,5'; a number is allowed",
@@ -448,6 +494,12 @@ BAD_FILES = {
 def test_a_bad_file_is_refused_by_its_line(tmp_path, text, message):
     (tmp_path / "tower.csv").write_text(text)
     with pytest.raises(ValueError, match=message):
+        sim.read_forcing(tmp_path / "tower.csv", **ALASKA)
+
+
+def test_a_file_that_is_not_utf8_is_refused_by_its_line(tmp_path):
+    (tmp_path / "tower.csv").write_bytes(b"# tower\nTIMESTAMP,TA_F,T \xb0C\n20190101,1,1\n")
+    with pytest.raises(ValueError, match="tower.csv, line 2: byte 0xb0 is not UTF-8; save the file as UTF-8"):
         sim.read_forcing(tmp_path / "tower.csv", **ALASKA)
 
 

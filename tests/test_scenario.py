@@ -10,7 +10,7 @@ from playing import NAN, quick, quick_vector
 
 import sim
 from analysis import make_scenarios
-from sim.scenario import COLUMNS, FIRST_YEAR
+from sim.scenario import COLUMNS, FIRST_YEAR, check_scenario
 from sim.task.episodes import BALANCED_WORLD
 
 SITE = {"mean_annual_temperature_c": -9.0}
@@ -64,6 +64,22 @@ def test_a_stand_starts_in_the_first_year_of_a_path():
     pd.testing.assert_frame_equal(simulate("ssp585"), simulate(by_hand))
     own = PATHS["ssp585"].query("year >= @FIRST_YEAR").drop(columns="year")
     pd.testing.assert_frame_equal(simulate("ssp585"), simulate(own))
+
+
+def test_a_path_keeps_its_years():
+    """Whatever has them, what is before a stand's first year is left out."""
+    table = PATHS["ssp585"]
+    by_year = table.set_index("year")
+    expected = check_scenario("ssp585").values
+    for own in (
+        table,
+        by_year,
+        table.set_index(pd.PeriodIndex(table.year.astype(str), freq="Y")).drop(columns="year"),
+        {name: dict(by_year[name]) for name in COLUMNS},
+        {name: list(table[name]) for name in ("year", *COLUMNS)},
+        {name: by_year[name] for name in COLUMNS},
+    ):
+        np.testing.assert_array_equal(check_scenario(own).values, expected)
 
 
 # ------------------------------------------------------------------------------------------- what a path does
@@ -159,17 +175,23 @@ def test_an_agent_sees_the_sites_own_climate_and_the_year():
 BAD = {
     "name": ("ssp370", r"scenario 'ssp370': allowed are None, ssp126, ssp245, ssp585, or a dict or DataFrame"),
     "number": (4.5, r"scenario 4.5: allowed are None, ssp126"),
-    "column": ({"warming": [1.0] * 4}, r"unknown column 'warming' of the scenario; allowed: warming_k, "),
+    "column": ({"warming": [1.0] * 4}, r"unknown column 'warming' of the scenario; allowed: year, warming_k, "),
     "nothing": ({}, r"the scenario has no column; allowed: warming_k"),
     "one number": ({"warming_k": 1.0}, r"scenario warming_k: a number for each year is allowed, got 1.0"),
     "text": ({"warming_k": ["a"] * 4}, r"scenario warming_k: a number for each year is allowed"),
     "short": ({"warming_k": [1.0] * 3}, r"years = 4: the scenario has 3 years, so at most 3 are allowed"),
     "unequal": ({"warming_k": [1.0] * 4, "co2_ppm": [400] * 5}, r"columns are not equally long: .*: 4.*: 5"),
-    "gap": ({"warming_k": [1.0, 1.0, NAN, 1.0]}, r"scenario warming_k = nan in year 3: \[-10, 15\] K is allowed"),
-    "absurd": ({"warming_k": [1.0, 150.0, 1.0, 1.0]}, r"scenario warming_k = 150 in year 2: \[-10, 15\] K"),
-    "negative co2": ({"co2_ppm": [-400.0] * 4}, r"scenario co2_ppm = -400 in year 1: \[200, 1500\] ppm"),
-    "negative rain": ({"precipitation_factor": [-0.1] * 4}, r"precipitation_factor = -0.1 in year 1: \[0, 3\]"),
-    "years apart": ({"warming_k": {2025: 1, 2027: 1, 2028: 1, 2029: 1}}, r"warming_k: its years have to follow"),
+    "gap": ({"warming_k": [1.0, 1.0, NAN, 1.0]}, r"scenario warming_k = nan in 2027: \[-10, 15\] K is allowed"),
+    "absurd": ({"warming_k": [1.0, 150.0, 1.0, 1.0]}, r"scenario warming_k = 150 in 2026: \[-10, 15\] K"),
+    "negative co2": ({"co2_ppm": [-400.0] * 4}, r"scenario co2_ppm = -400 in 2025: \[200, 1500\] ppm"),
+    "negative rain": ({"precipitation_factor": [-0.1] * 4}, r"precipitation_factor = -0.1 in 2025: \[0, 3\]"),
+    "years apart": (
+        {"warming_k": {2025: 1, 2027: 1, 2028: 1, 2029: 1}},
+        r"have to follow each other, got 2027 after 2025",
+    ),
+    "years to come": ({"warming_k": {2030 + k: 1.0 for k in range(60)}}, r"years are 2030 to 2089; 2025 is needed"),
+    "years of text": ({"warming_k": [1.0], "year": ["now"]}, r"its years have to be integers, got \['now'\]"),
+    "years of another length": ({"warming_k": [1.0] * 4, "year": [2025]}, r"4 values of 1 years; a value each"),
 }
 
 

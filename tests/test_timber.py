@@ -129,16 +129,30 @@ def test_a_table_of_ones_own(tmp_path):
     with pytest.raises(ValueError, match="sawlog_conifer comes twice"):
         read_prices(path)
     for column, value, message in (
-        ("value", "", "sawlog_conifer has the value ''; a number"),
-        ("value", "-3", "sawlog_conifer = -.*not negative"),
-        ("value", "nan", "sawlog_conifer = nan"),
-        ("unit", "cord", "sawlog_conifer has the unit 'cord'; allowed are m3, m3 under bark"),
+        ("value", "", "line 2: sawlog_conifer has the value ''; a number"),
+        ("value", "-3", "line 2: sawlog_conifer has the value -3; a finite number, not negative"),
+        ("value", "nan", "sawlog_conifer has the value nan"),
+        ("unit", "cord", "sawlog_conifer has the unit 'cord'; allowed: m3, m3 under bark$"),
+        ("unit", "seedling", "line 2: sawlog_conifer has the unit 'seedling'; allowed: m3, m3 under bark$"),
+        ("per_eur", "9", "line 3: per_eur is 10.63 for SEK of 2022, and 9 above; one rate is allowed"),
         ("per_eur", "0", "sawlog_conifer has the per_eur 0; a positive number"),
         ("item", "sawlogs", "unknown item 'sawlogs'; allowed are sawlog_conifer"),
     ):
         write([{**rows[0], column: value}, *rows[1:]])
         with pytest.raises(ValueError, match=message):
             read_prices(path)
+    write([{**row, "unit": "m3"} for row in rows])
+    with pytest.raises(ValueError, match="line 8: planting has the unit 'm3'; allowed: seedling"):
+        read_prices(path)
+    write([rows[0], dict.fromkeys(rows[0], ""), *rows[1:]])
+    assert read_prices(path) == read_prices("sweden")
+    text = path.read_text()
+    path.write_text(text.replace(",", ";"))
+    with pytest.raises(ValueError, match="line 1: column item is missing; item, value, .* separated by commas"):
+        read_prices(path)
+    path.write_bytes(text.replace("Vägkostnaderna", "V\xe4g").encode("latin-1"))
+    with pytest.raises(ValueError, match="prices.csv', line 10: byte 0xe4 is not UTF-8"):
+        read_prices(path)
 
 
 REFUSED = {

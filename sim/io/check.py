@@ -4,6 +4,8 @@ import numpy as np
 import pandas as pd
 
 from sim.io.clock import DAY, hours_apart, noon_of
+from sim.io.columns import MM_A_YEAR
+from sim.io.plausible import DAYS_OF_A_YEAR
 from sim.state import DAYS, FORCING
 
 #: Allowed values of an observed forcing: column -> (low, high, unit, hint).
@@ -86,6 +88,13 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
     if days % 1 or (days > DAYS and days % DAYS) or (days < DAYS and years > 1):
         raise ValueError(f"forcing of {days:g} days: whole years of 365 days, or whole days with years=1, are allowed")
     _check_noon(kept, minutes)
+    if days >= DAYS_OF_A_YEAR:
+        yearly = float(kept["precipitation_mm"].mean() * per_day * DAYS)
+        if yearly > MM_A_YEAR[1]:
+            raise ValueError(
+                f"forcing: precipitation_mm is {yearly:.3g} mm a year; at most {MM_A_YEAR[1]:g} is allowed (each row "
+                f"has the mm of its {minutes} minutes)"
+            )
     group = int(time_step_minutes // minutes)
     values = kept.to_numpy(float).reshape(-1, group, len(FORCING))
     steps = values.mean(axis=1)

@@ -4,12 +4,14 @@ import difflib
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
 #: Unit -> (factor, offset) into ours, by kind of quantity. Per interval: the factor is divided by its seconds.
 _TEMPERATURE = {"degC": (1.0, 0.0), "K": (1.0, -273.15)}
 _PRESSURE = {"hPa": (1.0, 0.0), "kPa": (10.0, 0.0), "Pa": (0.01, 0.0)}
 _RADIATION = {"W m-2": (1.0, 0.0), "J m-2": (1.0, 0.0), "kJ m-2": (1e3, 0.0), "MJ m-2": (1e6, 0.0)}
 PER_INTERVAL = ("J m-2", "kJ m-2", "MJ m-2")  # to be divided by the seconds of the interval
-RATES = ("kg m-2 s-1", "mm s-1")  # to be multiplied by them
+RATES = {"kg m-2 s-1": 1.0, "mm s-1": 1.0, "mm h-1": 3600.0, "mm d-1": 86400.0}  # seconds of what they are by
 _UNITS = {
     "air_temperature": _TEMPERATURE,
     "deficit": _PRESSURE,
@@ -38,6 +40,8 @@ LIMITS = {
     "precipitation": ("mm", -0.1, 200.0),
     "air_pressure": ("hPa", 500.0, 1100.0),
 }
+LEAST_LIGHT_W_M2 = 20.0  # brightest moment of a column of light
+MM_A_YEAR = (20.0, 5000.0)
 
 #: Quantity -> column -> unit, the preferred first. Towers: FLUXNET (filled, consolidated `_F` before the rest), ICOS
 #: and AmeriFlux; reanalyses: ERA5-Land by its short and long names, and of the Earth Engine; last, our own names.
@@ -117,17 +121,43 @@ class Column:
         """Values of intervals of so many seconds in our unit."""
         return self._into_ours(values, self.unit, seconds)
 
-    def hint(self, value: float, seconds: float) -> str:
-        """What unit a value beyond its limits might have, in words."""
-        _, low, high = LIMITS[self.kind]
+    def as_given(self, values, seconds: float):
+        """The inverse of `converted`."""
+        zero, one = self.converted(0.0, seconds), self.converted(1.0, seconds)
+        return (values - zero) / (one - zero)
+
+    @property
+    def units(self) -> str:
+        """The units that it may have, in words."""
+        return ", ".join(_UNITS[self.kind])
+
+    def hint(self, values, seconds: float) -> str:
+        """What other unit makes all values (as given) plausible, in words; nothing where there is none."""
         for unit in _UNITS[self.kind]:
-            if unit != self.unit and low <= self._into_ours(value, unit, seconds) <= high:
+            photons_too = unit == "kJ m-2"  # of a half-hour are near as many as umol m-2 s-1 of photons
+            if (
+                unit != self.unit
+                and not photons_too
+                and self._plausible(self._into_ours(values, unit, seconds), seconds)
+            ):
                 return f"; if it is in {unit}, say units={{{self.name!r}: {unit!r}}}"
         return ""
 
+    def _plausible(self, ours, seconds: float) -> bool:
+        _, low, high = LIMITS[self.kind]
+        lowest, highest, mean = np.nanmin(ours), np.nanmax(ours), np.nanmean(ours)
+        if self.kind == "shortwave":
+            return low <= lowest and LEAST_LIGHT_W_M2 <= highest <= high
+        if self.kind == "precipitation":
+            return low <= lowest and highest <= high and MM_A_YEAR[0] <= mean * 365 * 86400 / seconds <= MM_A_YEAR[1]
+        return low <= lowest and highest <= high
+
     def _into_ours(self, values, unit: str, seconds: float):
         factor, offset = _UNITS[self.kind][unit]
-        factor = factor / seconds if unit in PER_INTERVAL else factor * seconds if unit in RATES else factor
+        if unit in PER_INTERVAL:
+            factor = factor / seconds
+        elif unit in RATES:
+            factor = factor * (seconds / RATES[unit])
         return factor * values + offset
 
 
@@ -158,18 +188,22 @@ def choose(table: list[str], columns: dict | None, units: dict | None, empty) ->
             raise ValueError(f"units: the record has no column {name!r}{_near(name, table)}")
 
     found: dict[str, Column] = {}
-    notes: list[str] = []
+    empties: dict[str, list[str]] = {}
     for quantity, names in NAMES.items():
-        name, passed_over = _pick(quantity, names, table, columns, empty)
-        notes += passed_over
+        name, empties[quantity] = _pick(quantity, names, table, columns, empty)
         if name:
             found[quantity] = _column(quantity, name, names, table, units)
     by_parts = "eastward_wind" in found and "northward_wind" in found
     for quantity in NEEDED:
         if quantity not in found and not (quantity == "wind_speed" and by_parts):
-            some = ", ".join(list(NAMES[quantity])[:8])
+            what, some = quantity.replace("_", " "), ", ".join(list(NAMES[quantity])[:8])
+            if empties[quantity]:
+                raise ValueError(
+                    f"forcing: no number for {what}: {', '.join(empties[quantity])} is empty, or -9999, in every row; "
+                    f"another column is named by columns={{{quantity!r}: '..'}}"
+                )
             raise ValueError(
-                f"forcing: no column for {quantity.replace('_', ' ')}: none of {some}, ..; "
+                f"forcing: no column for {what}: none of {some}, ..; "
                 f"name yours: columns={{{quantity!r}: '..'}}; the record has {_some(table)}"
             )
     if "wind_speed" in found or not by_parts:
@@ -179,6 +213,7 @@ def choose(table: list[str], columns: dict | None, units: dict | None, empty) ->
     if unused:
         raise ValueError(f"units: {unused[0]} is not used; used are {', '.join(sorted(used))}")
     time, kind = _time(table, columns, any(OF_REANALYSIS.fullmatch(name) for name in used))
+    notes = [f"{name} has no number and was passed over" for names in empties.values() for name in names]
     return Choice(found, time, kind, notes)
 
 
@@ -189,14 +224,14 @@ def _pick(quantity, names, table, columns, empty) -> tuple[str | None, list[str]
         if empty(name):
             raise ValueError(f"forcing: column {name}, for {quantity}, has no number")
         return name, []
-    notes: list[str] = []
+    passed_over: list[str] = []
     for name in names:
         there = [name] if name in table else _at_positions(name, table)
         for column in there:
             if not empty(column):
-                return column, notes
-            notes.append(f"{column} has no number and was passed over")
-    return None, notes
+                return column, passed_over
+            passed_over.append(column)
+    return None, passed_over
 
 
 def _at_positions(name: str, table: list[str]) -> list[str]:

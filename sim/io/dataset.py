@@ -1,8 +1,8 @@
 """Daily and annual output as an xarray Dataset, with the names, units and attributes of ALMA and CF, for NetCDF.
 
 Daily fluxes are means over the day, on `time` (its start, with bounds); stocks of water and snow are those at the
-day's end. Soil temperatures have a `depth` below the top of the mineral soil: between nodes, interpolate. Annual output
-keeps the names of `sim.state.RECORD`, on `year`. There is no 29 February.
+day's end, and say so (`comment`). Soil temperatures have a `depth` below the top of the mineral soil: between nodes,
+interpolate. Annual output keeps the names of `sim.state.RECORD`, on `year`. There is no 29 February.
 """
 
 import json
@@ -15,7 +15,7 @@ from sim.physical_constants import FREEZING_POINT_K, SECONDS_PER_DAY
 _DAY = 1.0 / SECONDS_PER_DAY
 _K, _CARBON, _WATER, _HEAT = ("K", 1.0), ("kg m-2 s-1", _DAY), ("kg m-2 s-1", _DAY), ("W m-2", 1e6 * _DAY)
 _AMOUNT, _ONE, _METRE = ("kg m-2", 1.0), ("1", 1.0), ("m", 1.0)
-MEAN, END = "time: mean", "time: point"
+MEAN, END = {"cell_methods": "time: mean"}, {"comment": "at the day's end, the second of time_bnds"}
 _BY_PLANTS = "surface_upward_mass_flux_of_carbon_dioxide_expressed_as_carbon_due_to_plant_respiration"
 _BY_SOIL = "surface_upward_mass_flux_of_carbon_dioxide_expressed_as_carbon_due_to_heterotrophic_respiration"
 
@@ -74,20 +74,20 @@ def to_dataset(
     xarray = import_xarray('output="xarray"')
     time = daily.index.to_numpy().astype("datetime64[ns]")
     variables: dict[str, tuple] = {}
-    for column, (name, (unit, factor), standard_name, cell_methods) in VARIABLES.items():
+    for column, (name, (unit, factor), standard_name, of_times) in VARIABLES.items():
         values = daily[column].to_numpy() * factor + (FREEZING_POINT_K if unit == "K" else 0.0)
-        attributes = {"long_name": columns[column][1], "units": unit, "cell_methods": cell_methods}
+        attributes = {"long_name": columns[column][1], "units": unit, **of_times}
         if standard_name:
             attributes["standard_name"] = standard_name
         variables[name] = ("time", values, attributes)
     profile = np.column_stack([daily[list(PROFILE)], np.full(len(daily), boundary_c)]) + FREEZING_POINT_K
     attributes = {"long_name": "temperature of the mineral soil", "units": "K", "standard_name": "soil_temperature"}
-    variables["SoilTemp"] = (("time", "depth"), profile, {**attributes, "cell_methods": MEAN})
+    variables["SoilTemp"] = (("time", "depth"), profile, {**attributes, **MEAN})
     variables["time_bnds"] = (("time", "bnds"), np.stack([time, time + np.timedelta64(1, "D")], axis=1))
     for column in annual.columns.drop("year"):
         unit, meaning = columns[column]
         attributes = {"long_name": f"{meaning}, of the year", "units": _UDUNITS.get(unit, unit)}
-        variables[f"annual_{column}"] = ("year", annual[column].to_numpy(), attributes)
+        variables[f"annual_{column.removeprefix('annual_')}"] = ("year", annual[column].to_numpy(), attributes)
 
     depth = [0.0, 0.5 * constants["surface_soil_depth_m"], constants["deep_soil_node_m"], constants["boundary_depth_m"]]
     below = {

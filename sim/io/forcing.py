@@ -25,8 +25,9 @@ FLAGS = {
     4: "computed here: longwave from temperature, humidity and sunlight",
     5: "set here to its limit: no negative light or rain, no humidity above saturation",
     6: "repeated here from the day beside it, where the record's first or last day is not whole by solar time",
+    7: "filled here: by the reanalysis column that the record has beside it",
 }
-GIVEN, BY_SOURCE, BY_LINE, BY_MEAN, COMPUTED, LIMITED, REPEATED = FLAGS
+GIVEN, BY_SOURCE, BY_LINE, BY_MEAN, COMPUTED, LIMITED, REPEATED, BY_REANALYSIS = FLAGS
 OURS = dict(
     zip(("air_temperature", "humidity", "wind_speed", "shortwave", "longwave", "precipitation"), FORCING, strict=True)
 )
@@ -82,6 +83,8 @@ def read_forcing(
     _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_gap_days, diurnal_cycle)
     table = open_table(source)
     rows = table.read(_recognised(table.columns, columns, units))
+    if not len(rows):
+        raise ValueError(f"{table.name}: 0 rows; whole days at a regular interval are allowed")
     choice = choose(table.columns, columns, units, lambda name: _is_empty(rows[name]))
     times = read_times(table, rows[choice.time], choice.time)
     if times.tz is not None:
@@ -232,22 +235,19 @@ def _values(table: Table, rows: pd.DataFrame, choice: Choice, times: pd.Datetime
     return record, flags, pd.Series(np.arange(len(times), dtype=float), index=times).reindex(index)
 
 
-def _check_limits(table, times, column: Column, values, seconds, rows=None) -> None:
+def _check_limits(table, times, column: Column, values, seconds, rows=None, verb="is") -> None:
     unit, low, high = LIMITS[column.kind]
     wrong = (values < low) | (values > high)
     if wrong.any():
         k = int(np.argmax(wrong))
         where = table.where(k if rows is None else int(rows[k]))
+        given = column.as_given(values, seconds)
+        of_record = f"{given[k]:.6g} {column.unit}, which is " if column.unit != unit else ""
         unit = "" if unit == "1" else f" {unit}"
         raise ValueError(
-            f"{where} ({times[k]:%Y-%m-%d %H:%M}): {column.name} is {values[k]:.6g}{unit}; "
-            f"[{low:g}, {high:g}]{unit} is allowed{column.hint(_unconverted(column, values[k], seconds), seconds)}"
+            f"{where} ({times[k]:%Y-%m-%d %H:%M}): {column.name} {verb} {of_record}{values[k]:.6g}{unit}; "
+            f"[{low:g}, {high:g}]{unit} is allowed{column.hint(given, seconds)}"
         )
-
-
-def _unconverted(column: Column, value: float, seconds: float) -> float:
-    zero, one = column.converted(0.0, seconds), column.converted(1.0, seconds)
-    return (value - zero) / (one - zero)
 
 
 def _between_times(table, record, flags, row_of, choice, interval):
@@ -265,7 +265,8 @@ def _between_times(table, record, flags, row_of, choice, interval):
     rows = row_of.to_numpy()[1:]
     for quantity in sums:
         values = between[quantity].to_numpy()
-        _check_limits(table, times[1:], choice.columns[quantity], values, seconds, np.nan_to_num(rows))
+        verb = "grows by" if since_midnight else "is"
+        _check_limits(table, times[1:], choice.columns[quantity], values, seconds, np.nan_to_num(rows), verb)
     what = "since midnight UTC" if since_midnight else "of each interval"
     note = f"light and precipitation are sums {what}; the rest are values at the times, averaged over each interval"
     return between, flags.iloc[1:].copy(), pd.Series(rows, index=between.index), note
@@ -359,7 +360,7 @@ def _fill(table, record, flags, row_of, choice: Choice, interval: int, gaps: str
         if gaps == "refuse":
             raise ValueError(_first_gap(table, record, row_of, choice, quantity, empty, interval))
         if f"{quantity}_beside" in record:
-            _put(record, flags, quantity, record[f"{quantity}_beside"], BY_SOURCE)
+            _put(record, flags, quantity, record[f"{quantity}_beside"], BY_REANALYSIS)
         if quantity == "longwave":
             continue
         left = record[quantity].isna().to_numpy() & kept

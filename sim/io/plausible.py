@@ -4,13 +4,14 @@ import numpy as np
 import pandas as pd
 
 from sim.io.clock import hours_apart, noon_of
-from sim.io.columns import Column
+from sim.io.columns import MM_A_YEAR, Column
 from sim.io.longwave import extraterrestrial
 
 FEWEST_DAYS = 20  # that tell
 NOON_WITHIN_H = 0.75
 LEAST_SUN_W_M2 = 50.0  # extraterrestrial, of a day whose clearness tells
 WARM_C = 5.0
+DAYS_OF_A_YEAR = 300  # at least, that a year's precipitation is told by
 
 
 def check_sun(name: str, weather: pd.DataFrame, interval: int, expected_h: float, clock: str) -> None:
@@ -33,18 +34,20 @@ def check_sun(name: str, weather: pd.DataFrame, interval: int, expected_h: float
 def check_units(
     name: str, weather: pd.DataFrame, columns: dict[str, Column], latitude_deg: float, interval: int
 ) -> None:
-    """Refuse values within their limits that must be of another unit; a column whose unit the caller gave passes.
+    """Refuse values within their limits that must be of another unit. Dry air, damp air and little rain pass where the
+    caller gave the unit; light that no sky gives, and rain of no climate, do not.
 
     weather : by local solar time, the record's quantities, relative humidity and precipitation of an interval.
     """
     days = weather.groupby(weather.index.normalize()).mean()
     dates = pd.DatetimeIndex(days.index)
 
-    def refuse(column, what):
-        if not column.unit_given:
+    def refuse(column, what, possible=True):
+        if not (possible and column.unit_given):
+            again = f"; {column.unit} again goes on" if possible else ""
             raise ValueError(
-                f"{name}: {column.name} in {column.unit}: {what}; give its unit, or that one, to go on: "
-                f"units={{{column.name!r}: ..}}"
+                f"{name}: {column.name} in {column.unit}: {what}; say its unit: units={{{column.name!r}: ..}}, of "
+                f"{column.units}{again}"
             )
 
     possible = extraterrestrial(dates, latitude_deg)
@@ -53,7 +56,7 @@ def check_units(
         brightest = float(np.quantile((days["shortwave"].to_numpy() / possible)[sunny], 0.98))
         if not 0.3 <= brightest <= 1.1:
             share = f"{100 * brightest:.3g} % of the sunlight above the atmosphere"
-            refuse(columns["shortwave"], f"a clear day has {share}, where 60 to 85 are usual")
+            refuse(columns["shortwave"], f"a clear day has {share}, where 60 to 85 are usual", possible=False)
     humidity = columns["humidity"]
     warm = (days["air_temperature"] > WARM_C) & days["humidity"].notna()
     if warm.sum() >= FEWEST_DAYS:
@@ -63,7 +66,8 @@ def check_units(
             refuse(humidity, f"relative humidity is above {100 * driest:.0f} % in 98 of 100 warm intervals")
         if median < 0.15:
             refuse(humidity, f"relative humidity is {100 * median:.2g} % in half of all warm intervals")
-    if len(days) >= 300:
-        yearly = float(weather["precipitation"].mean() * 1440 / interval * 365)
-        if not 20.0 <= yearly <= 5000.0:
-            refuse(columns["precipitation"], f"precipitation is {yearly:.3g} mm a year")
+    if len(days) >= DAYS_OF_A_YEAR:
+        yearly, (least, most) = float(weather["precipitation"].mean() * 1440 / interval * 365), MM_A_YEAR
+        if not least <= yearly <= most:
+            what = f"precipitation is {yearly:.3g} mm a year; [{least:g}, {most:g}] is usual"
+            refuse(columns["precipitation"], what, possible=yearly < least)

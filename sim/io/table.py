@@ -19,12 +19,12 @@ class Table:
     columns: list[str]
     read: Callable[[list[str]], pd.DataFrame]
     first_line: int | None = None
-    """Line of the file that has the first row; None for a table in memory, whose rows count from 0."""
+    """Line of the file that has the first row; None for a table in memory."""
 
     def where(self, row: int) -> str:
         """The row, as an error names it."""
         if self.first_line is None:
-            return f"{self.name}, row {row}"
+            return f"{self.name}, zero-based row {row}"
         return f"{self.name}, line {self.first_line + row}"
 
     def numbers(self, texts: pd.Series, name: str) -> np.ndarray:
@@ -57,7 +57,19 @@ def open_table(source) -> Table:
         raise ValueError(
             f"forcing: {path.name}: a CSV file (also .gz) or a NetCDF file is allowed; unpack or export it"
         )
+    check_utf8(f"forcing: {path.name}", path)
     return _csv(path)
+
+
+def check_utf8(what: str, path: Path) -> None:
+    """Refuse a text file that is not UTF-8, by its line. what : how the error begins."""
+    with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            try:
+                line.decode("utf-8")
+            except UnicodeDecodeError as error:
+                byte = f"byte 0x{line[error.start]:02x}"
+                raise ValueError(f"{what}, line {number}: {byte} is not UTF-8; save the file as UTF-8") from None
 
 
 def _csv(path: Path) -> Table:

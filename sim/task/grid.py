@@ -52,8 +52,13 @@ def climate_at(climate, latitude: np.ndarray, longitude: np.ndarray) -> pd.DataF
     import xarray
 
     if isinstance(climate, (str, Path)):
-        opened = xarray.open_zarr if Path(climate).is_dir() else xarray.open_dataset
-        with opened(climate) as file:
+        if not Path(climate).exists():
+            raise ValueError(f"climate: there is no file {climate}")
+        try:
+            file = (xarray.open_zarr if Path(climate).is_dir() else xarray.open_dataset)(climate)
+        except (OSError, ValueError) as error:
+            raise ValueError(f"climate: {climate} cannot be read as a NetCDF file or a zarr store") from error
+        with file:
             return climate_at(file, latitude, longitude)
     axes: dict[str, str] = {}
     for name, names in AXES.items():

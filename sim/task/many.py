@@ -27,7 +27,7 @@ from sim.block import is_compiled, lanes_for
 from sim.executor import HERE, each
 from sim.management import NUM_ACTIONS, check_actions
 from sim.parameters import check_name, check_seed
-from sim.spin_up import BOUNDARY, INITIAL_LIMITS, check_initial
+from sim.spin_up import BOUNDARY, CLASS_NAMES, INITIAL_LIMITS, LARGEST_STEM_KGC, check_initial
 from sim.stands import available_cores
 from sim.state import RECORD
 from sim.task.actions import NO_CHANGE
@@ -65,6 +65,7 @@ CHUNK_STAND_YEARS, LARGEST_CHUNK = 51_200, 4096  # a chunk: half a minute on two
 TELL_SECONDS = 10.0
 
 LATITUDE, LONGITUDE, SEED = "latitude_deg", "longitude_deg", "seed"
+DENSITY, BIOMASS = "density_stems_ha", "biomass_kgc_m2"
 #: Columns that a table of sites may have: name -> (low, high, unit).
 COLUMNS = {
     **{name: (p.physical_low, p.physical_high, p.unit) for name, p in sim.SITE_PARAMETERS.items()},
@@ -284,21 +285,48 @@ def check_sites(sites, others: str, seed: int) -> pd.DataFrame:
         raise ValueError("sites: the table has no row; at least one site is needed")
     for name in sites.columns:
         if name not in COLUMNS:
-            near = difflib.get_close_matches(str(name), COLUMNS, n=3)
-            hint = f"did you mean {', '.join(near)}? " if near else ""
-            raise ValueError(f"sites: unknown column {name!r}; {hint}allowed: {', '.join(COLUMNS)}")
+            begun = [column for column in COLUMNS if column.startswith(str(name).lower())]
+            near = begun[:3] or difflib.get_close_matches(str(name).lower(), COLUMNS, n=3)
+            raise ValueError(
+                f"sites: unknown column {name!r}; "
+                + (f"did you mean {', '.join(near)}? " if near else "")
+                + "allowed are names of sim/site_parameters.csv, first stocks (initial= of sim.simulate), "
+                f"{LONGITUDE} and {SEED}"
+            )
     if not sites.columns.is_unique:
         raise ValueError(f"sites: column {sites.columns[sites.columns.duplicated()][0]!r} is there twice")
     if LATITUDE not in sites:
         raise ValueError(f"sites: column {LATITUDE} is missing; every site needs its latitude")
     table = pd.DataFrame({name: check_column(sites[name], *COLUMNS[name]) for name in sites.columns})
-    check_initial({name: table[name].iloc[0] for name in table if name in INITIAL_LIMITS})  # what excludes each other
+    check_initial({name: table[name].iloc[0] for name in table if name in INITIAL_LIMITS and name != BIOMASS})
+    check_biomass(table, sites.index)
     if SEED not in table:
         last = check_seed("seed", seed) + len(table) - 1
         if last >= 2**63:
             raise ValueError(f"seed = {seed}: row k gets seed + k, so at most 2^63 - {len(table)} is allowed")
         table[SEED] = np.arange(seed, last + 1)
     return table.reset_index(drop=True)
+
+
+def row_of(index: pd.Index, k: int) -> str:
+    """Row k, as an error names it."""
+    return f"zero-based row {k}" if index.equals(pd.RangeIndex(len(index))) else f"row {index[k]}"
+
+
+def check_biomass(table: pd.DataFrame, index: pd.Index) -> None:
+    """Refuse first biomass of no stems, or of more than `LARGEST_STEM_KGC` a stem."""
+    by_class = [name for name in CLASS_NAMES if name in table]
+    if BIOMASS not in table or not (by_class or DENSITY in table):
+        return
+    stems = table[by_class].sum(axis=1) if by_class else table[DENSITY]
+    most = stems * LARGEST_STEM_KGC * 1e-4
+    wrong = (table[BIOMASS] > most).to_numpy()
+    if wrong.any():
+        k = int(wrong.argmax())
+        raise ValueError(
+            f"sites: {row_of(index, k)}, column {BIOMASS} is {table[BIOMASS].iloc[k]:g}; of {stems.iloc[k]:g} stems/ha "
+            f"at most {most.iloc[k]:.4g} kgC/m2 is allowed, {LARGEST_STEM_KGC:g} kgC a stem"
+        )
 
 
 def check_column(column: pd.Series, low: float, high: float, unit: str) -> np.ndarray:
@@ -315,7 +343,7 @@ def check_column(column: pd.Series, low: float, high: float, unit: str) -> np.nd
         value = "missing" if pd.isna(column.iloc[k]) else f"{column.iloc[k]}"
         kind = "an integer" if whole else "a number"
         raise ValueError(
-            f"sites: row {column.index[k]}, column {column.name} is {value}; "
+            f"sites: {row_of(column.index, k)}, column {column.name} is {value}; "
             f"{kind} in [{low:g}, {high:g}]{f' {unit}' if unit not in ('', '1') else ''} is allowed"
         )
     return numbers.to_numpy(np.int64 if whole else float)
@@ -336,6 +364,13 @@ def check_world(years: int, arguments: dict, table: pd.DataFrame) -> Episodes:
 def check_choice(actions, label: str | None, sites: int, one: Episodes) -> tuple[Any, str]:
     """A policy, or actions (sites, years); and what the store says of them. one : an episode of their world."""
     if callable(actions):
+        observed = len(one.observation_space.low)
+        size = getattr(actions, "size", observed)
+        if size != observed:
+            raise ValueError(
+                f"policy {getattr(actions, 'name', '')!r} is of another world: it observes {size} entries, here are "
+                f"{observed}; give the arguments of its training, such as objectives and observation_groups"
+            )
         done = digest(choose(actions, *probes(one)).astype(np.int64))
         name = getattr(actions, "__qualname__", type(actions).__qualname__)
         return actions, label or f"{getattr(actions, '__module__', '')}.{name} {done}"

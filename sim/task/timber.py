@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from sim.assortment import PRODUCTS
+from sim.io.table import check_utf8
 
 SPECIES = ("conifer", "deciduous")
 
@@ -25,7 +26,9 @@ ITEMS = (
 )
 
 #: m3 under bark in a m3 over bark: bark is an eighth of a stem (Lambert et al. 2005: 12 % of a spruce of 20 cm).
-UNITS = {"m3": 1.0, "m3 under bark": 0.88, "seedling": 1.0}
+SEEDLING = "seedling"  # planting alone is by it
+UNITS = {"m3": 1.0, "m3 under bark": 0.88, SEEDLING: 1.0}
+READ = ("item", "value", "currency", "unit", "year", "per_eur")  # columns of a table of prices that are read
 
 #: Stem volume of carbon [m3 ha-1 per kgC m-2], from carbon fraction (IPCC 2006, boreal: 0.51 conifers, 0.48 broadleaf)
 #: and basic density [t m-3] (IPCC 2006: spruce 0.40; 0.43, between birch 0.51 and aspen 0.35).
@@ -96,40 +99,66 @@ def read_prices(timber) -> dict[str, float]:
     if isinstance(timber, str) and timber in countries():
         return prices_of(f"timber {timber!r}", [row for row in shipped_rows() if row["country"] == timber])
     if isinstance(timber, (str, Path)) and str(timber).endswith(".csv"):
-        try:
-            text = Path(timber).read_text(encoding="utf-8")
-        except OSError as error:
-            raise ValueError(f"timber {str(timber)!r}: cannot be read ({error.strerror})") from None
-        return prices_of(f"timber {str(timber)!r}", list(csv.DictReader(text.splitlines())))
+        return prices_of(f"timber {str(timber)!r}", rows_of(Path(timber)))
     raise ValueError(
         f"timber {timber!r}: allowed are {', '.join(countries())}, a path to a .csv, a dict of {', '.join(ITEMS)}"
     )
 
 
+def rows_of(path: Path) -> list[dict]:
+    """Rows of a table of one's own, each with the `line` that it ends on; those without a text are left out."""
+    what = f"timber {str(path)!r}"
+    try:
+        check_utf8(what, path)
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise ValueError(f"{what}: cannot be read ({error.strerror})") from None
+    reader = csv.DictReader(text.splitlines(keepends=True))
+    missing = [name for name in READ if name not in (reader.fieldnames or ())]
+    if missing:
+        raise ValueError(
+            f"{what}, line 1: column {missing[0]} is missing; {', '.join(READ)} are needed, separated by commas"
+        )
+    rows = [{**row, "line": reader.line_num} for row in reader]
+    return [row for row in rows if any(row[name] for name in READ)]
+
+
 def prices_of(what: str, rows: list[dict]) -> dict[str, float]:
     """Checked prices of a table's rows."""
-    prices = {}
+    prices: dict[str, float] = {}
+    rates: dict[tuple, str] = {}
     for row in rows:
-        item = row.get("item")
+        where, item = f"{what}, line {row['line']}" if "line" in row else what, row["item"]
+        if item not in ITEMS:
+            raise ValueError(f"{where}: unknown item {item!r}; allowed are {', '.join(ITEMS)}")
         if item in prices:
-            raise ValueError(f"{what}: {item} comes twice; each item once, of one country, is allowed")
-        prices[item] = in_eur(what, row)
+            raise ValueError(f"{where}: {item} comes twice; each item once, of one country, is allowed")
+        prices[item] = in_eur(where, row)
+        money = row["currency"], row["year"]
+        if rates.setdefault(money, row["per_eur"]) != row["per_eur"]:
+            raise ValueError(
+                f"{where}: per_eur is {row['per_eur']} for {' of '.join(money)}, and {rates[money]} above; one rate is "
+                "allowed"
+            )
     return check_prices(what, prices)
 
 
-def in_eur(what: str, row: dict) -> float:
+def in_eur(where: str, row: dict) -> float:
     """A row's value in EUR per m3 over bark, or per seedling."""
-    item, unit = row.get("item"), row.get("unit")
-    if unit not in UNITS:
-        raise ValueError(f"{what}: {item} has the unit {unit!r}; allowed are {', '.join(UNITS)}")
+    item, unit = row["item"], row["unit"]
+    units = [name for name in UNITS if (name == SEEDLING) == (item == "planting")]
+    if unit not in units:
+        raise ValueError(f"{where}: {item} has the unit {unit!r}; allowed: {', '.join(units)}")
     numbers = {}
     for name in ("value", "per_eur"):
         try:
-            numbers[name] = float(row.get(name) or "")
+            numbers[name] = float(row[name] or "")
         except ValueError:
-            raise ValueError(f"{what}: {item} has the {name} {row.get(name)!r}; a number is allowed") from None
-    if not numbers["per_eur"] > 0.0:
-        raise ValueError(f"{what}: {item} has the per_eur {row['per_eur']}; a positive number is allowed")
+            raise ValueError(f"{where}: {item} has the {name} {row[name]!r}; a number is allowed") from None
+    if not 0.0 <= numbers["value"] < np.inf:
+        raise ValueError(f"{where}: {item} has the value {row['value']}; a finite number, not negative, is allowed")
+    if not 0.0 < numbers["per_eur"] < np.inf:
+        raise ValueError(f"{where}: {item} has the per_eur {row['per_eur']}; a positive number is allowed")
     return numbers["value"] * UNITS[unit] / numbers["per_eur"]
 
 
