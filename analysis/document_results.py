@@ -277,6 +277,7 @@ EXCERPTS = {
     "towers": excerpts.towers,
     "first_run": excerpts.first_run,
     "scaling": excerpts.scaling,
+    "region_killed": excerpts.region_killed,
     "boreal_map": excerpts.boreal_map,
     "times": excerpts.times,
     "misses": excerpts.missing,

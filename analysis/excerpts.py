@@ -102,6 +102,19 @@ def scaling() -> str:
     return text + "\n" + "\n".join(lines) + f"\n\nMeasured on {table.machine.iloc[0]}.\n"
 
 
+def region_killed() -> str:
+    """What came of a region that was killed; results/region_killed.csv has it."""
+    path = paths.results() / "region_killed.csv"
+    if not path.exists():
+        return "Not measured yet.\n"
+    row = pd.read_csv(path).iloc[0]
+    outcome = "the same bytes as" if row.same_bytes else "OTHER BYTES THAN"
+    return (
+        f"Measured: {row.stands:,} stands under a trained policy for {row.years} years, killed {row.kills} times and "
+        f"gone on with, gave {outcome} a run that was left alone, in at most {row.peak_mb} MB of memory.\n"
+    )
+
+
 def boreal_map() -> str:
     """What the map says; results/studies/boreal_map.csv has it."""
     path = paths.studies() / "boreal_map.csv"

@@ -3,10 +3,11 @@
     python analysis/generalisation.py RUN [RUN ..]                      # outside: four shifts of the test sites
     python analysis/generalisation.py RUN --split validation calmer     # or any splits
 
-A split is the test or validation sites, or the test sites with one property moved out of the range that sites are drawn
-from (`sim/task/shifts.py`); "outside" is all of those. The test sites are always there, to compare with. A run is a
-finished one with its policy.pt; on the test sites its own evaluation counts, and an archived run will do. Printed are,
-for both policies, the score against the constant plans of the split, two ratios, and how much each drops outside.
+A split is the test or validation sites, or the test sites with one property, or two, moved out of the range that sites
+are drawn from (`sim/task/shifts.py`); "outside" is all of those. The test sites are always there, to compare with. A
+run is a finished one with its policy.pt; on the test sites its own evaluation counts, and an archived run will do.
+Printed are, for both policies, the score against the constant plans of the split, two ratios, and how much each drops
+outside.
 
 The ratios are those of Teoh, Varakantham and Vamplew (2025, ICLR, "On generalization across environments in
 multi-objective reinforcement learning"): NHGR is the hypervolume of a policy's front over that of the site's best known
@@ -106,7 +107,7 @@ def ratios(policies: Mapping[str, pd.DataFrame], best: pd.DataFrame) -> pd.DataF
 
 def summary(by_split: Mapping[str, pd.DataFrame], inside: str) -> pd.DataFrame:
     """Means over sites of `RATIOS` by policy and split, and the drop from inside to each other split, with 95 % t
-    intervals: paired by site, since a shift keeps the sites' seeds and moves one property. Sites without a ratio do not
+    intervals: paired by site, since a shift keeps the sites' seeds. Sites without a ratio do not
     count in it.
 
     by_split : split -> what `ratios` gave; inside : the split within the sampled range.

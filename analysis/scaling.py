@@ -43,8 +43,8 @@ class Args:
     """stands of the environment that is stepped"""
     repeats: int = 3
     """repeats of every figure"""
-    dollars_per_core_hour: float = 0.085
-    """price of a core: a quarter of an EC2 c5.2xlarge's on demand, 0.34 $ (Amazon EC2 Auto Scaling, User Guide)"""
+    dollars_per_core_hour: float = 0.0425
+    """price of a virtual core: an eighth of an EC2 c5.2xlarge's on demand, 0.34 $ (EC2 Auto Scaling, User Guide)"""
     dollars_per_gpu_hour: float = 4.92
     """price of an H100: of an EC2 Capacity Block of p5.48xlarge (Amazon EC2 Capacity Blocks, pricing of 2024)"""
     quick: bool = False

@@ -33,7 +33,8 @@ def test_the_map_of_a_strategy(tmp_path, monkeypatch, capsys):
     assert "At a carbon weight of 0.25 the policy plants 100 stems/ha a year, 50% of them conifers." in out
     figure = tmp_path / "results/quick/studies/boreal_map.png"
     first = figure.read_bytes()
-    boreal_map.main(boreal_map.Args("plus_100", preference=0.25, quick=True))
+    figure.unlink()
+    boreal_map.main(boreal_map.Args(redraw=True, quick=True))
     assert figure.read_bytes() == first
     (tmp_path / "results/studies").mkdir()
     (tmp_path / "results/quick/studies/boreal_map.csv").rename(tmp_path / "results/studies/boreal_map.csv")
@@ -45,6 +46,12 @@ def test_cells_lie_where_their_stands_are():
     *corners, values = boreal_map.cell_values(table, "value", 1.0)
     assert values.shape == (9, 179 + 1) and corners[0].shape == (10, 181)
     assert values.compressed().tolist() == [1.0, 2.0] and values[0, 0] == 1.0 and values[8, 178] == 2.0
+
+
+def test_what_is_not_there_cannot_be_drawn_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit, match="--redraw: no results/studies/boreal_map.csv yet"):
+        boreal_map.main(boreal_map.Args(redraw=True))
 
 
 def test_unknown_policies_end_the_script(tmp_path):

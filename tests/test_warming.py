@@ -32,37 +32,42 @@ def test_fronts_and_best_plans():
     assert warming.moved_sites(plans)["ssp585"] == 1.0 and warming.moved_sites(plans)["none"] == 0.0
 
 
-def test_the_warming_at_which_half_of_the_sites_are_lost():
-    share = np.r_[np.full(20, 1.0), np.zeros(20)]
-    years = pd.DataFrame({"scenario": "ssp585", "year": 2025 + np.arange(40), "warming_k": 1.0 + 0.1 * np.arange(40)})
-    years = years.assign(lost=share, kept=1.0)
-    found = warming.threshold(years, "lost")
-    assert found == (pytest.approx(3.5), 2050)  # the mean of ten years is below a half after six without ice
-    assert warming.threshold(years, "kept") is None
-
-
 def test_deepening_is_of_sites_that_stay_frozen():
     rows = [("none", 1, 1.0, 1), ("none", 2, 1.0, 1), ("none", 3, 12.0, 0)]
     for scenario in warming.SCENARIOS:
         rows += [(scenario, 1, 1.4, 1), (scenario, 2, 12.0, 0), (scenario, 3, 12.0, 0)]
     names = ["scenario", "site_seed", "thaw_depth_after_76_m", "frozen_after_76"]
     found = warming.deepening(pd.DataFrame(rows, columns=names).assign(action=NO_CHANGE))
-    assert found["median"].to_numpy() == pytest.approx(0.4) and (found.sites == 1).all() and (found.lost == 1).all()
+    assert found["median"].to_numpy() == pytest.approx(0.4) and found.share.to_numpy() == pytest.approx(0.4)
+    assert (found.sites == 1).all() and (found.lost == 0.5).all()
 
 
 def test_the_ground_that_no_plan_keeps():
+    """Sites of -6, -3 and -1 degC; one of 1 degC thaws without a scenario, and does not count."""
     frozen = {"none": [(1, 1), (1, 1), (1, 1), (0, 1)]} | dict.fromkeys(
-        warming.SCENARIOS, [(1, 1), (0, 1), (0, 0), (0, 0)]
+        warming.SCENARIOS, [(1, 1), (0, 1), (0, 0), (1, 1)]
     )
     rows = [
-        (scenario, site, action, of_plans[k], -6.0 + 2.0 * site)
+        (scenario, site, action, of_plans[k], of_plans[k], (-6.0, -3.0, -1.0, 1.0)[site])
         for scenario, sites in frozen.items()
         for site, of_plans in enumerate(sites)
         for k, action in enumerate((NO_CHANGE, 24))
     ]
-    names = ["scenario", "site_seed", "action", "frozen_after_76", "deep_after_76_c"]
-    found = warming.lost_ground(pd.DataFrame(rows, columns=names)).loc["ssp245"]
-    assert found.to_dict() == {"sites": 3, "lost": 1, "saved": 1, "coldest_lost": -2.0, "warmest_kept": -4.0}
+    plans = pd.DataFrame(
+        rows, columns=["scenario", "site_seed", "action", "frozen_after_50", "frozen_after_76", "deep_after_76_c"]
+    )
+    years = pd.concat(
+        pd.DataFrame({"scenario": name, "year": 2025 + np.arange(76), "warming_k": k * np.arange(76) / 75.0})
+        for k, name in enumerate((warming.NONE, *warming.SCENARIOS))
+    )
+    table, ground = warming.kept(plans, years), warming.always_frozen(plans)
+    assert table.warming_k.is_monotonic_increasing and len(ground) == 3
+    assert table["first"].tolist().count(2065) == 3 and set(table["last"]) == {2074, 2100}
+    assert (table[["no_change", "some_plan", "no_plan", *warming.GROUND_NAMES]] == [1, 2, 1, 1, 1, 0]).all(axis=None)
+    cold, _, warm = warming.answer(table, ground).splitlines()
+    assert (
+        "at none that is reached. Of 1 sites" in cold and "between 0.0 and 0.9 K. Of 1 sites some plan keeps 0" in warm
+    )
 
 
 def test_the_page_says_what_was_played(tmp_path):
@@ -73,6 +78,6 @@ def test_the_page_says_what_was_played(tmp_path):
     means = plans.groupby("scenario").thaw_return.mean()
     assert means["none"] > means["ssp585"]
     text = warming.page(plans, years)
-    assert "Of the 2 sites" in text and "| ssp585 | 1.1 |" in text and "| ssp126 |" in text
+    assert "| 1.1 | ssp585, 2025-2026 |" in text and "of the 2 sites are frozen in 2025-2026" in text
     warming.draw(plans, years, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000

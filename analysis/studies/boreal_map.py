@@ -1,6 +1,7 @@
 """What a policy plants over the boreal zone, and what that does to thaw depth and carbon against doing nothing.
 
     python analysis/studies/boreal_map.py --policy ppo_group-balanced
+    python analysis/studies/boreal_map.py --redraw      # the picture only, from the table of before
 
 A stand on every land point of a grid over the latitudes that sites are sampled from, simulated twice by
 `sim.simulate_many`, with and without the policy, under the same weather and dice. Climate follows latitude as for
@@ -40,7 +41,7 @@ LOWEST_LATITUDE = 48.0  # that is drawn
 class Args:
     """Maps what a policy plants, and what that does."""
 
-    policy: str
+    policy: str = "ppo_group-balanced"
     """folder of a run, a policy that ships (ppo_group-balanced), or a strategy of baselines_heuristic (plus_100)"""
     preference: float = 0.5
     """weight of carbon"""
@@ -54,6 +55,8 @@ class Args:
     """length of the simulations"""
     address: str = HERE
     """where: "none", all cores of this machine; "local", Ray on it; or the address of a Ray cluster"""
+    redraw: bool = False
+    """draw the picture again from results/studies/boreal_map.csv, and simulate nothing"""
     quick: bool = False
     """a spacing of 4 degrees and 3 years, into results/quick/studies"""
 
@@ -157,6 +160,15 @@ def sentences(table: pd.DataFrame, preference: float, years: int) -> str:
     )
 
 
+def title(table: pd.DataFrame, settings: dict) -> str:
+    """The picture's title."""
+    thaw = table.thaw_depth_change_m
+    return (
+        f"{settings['policy']}, carbon weight {settings['preference']:g}: thaw after {settings['years']} years "
+        f"{thaw.mean():+.2f} m in the mean of {len(table):,} stands, {thaw.median():+.2f} m in the middle one"
+    )
+
+
 PANELS = (
     ("planted_stems_ha_yr", "planted, stems/ha a year", "YlGn", False),
     ("conifer_share", "conifers among the planted", "BrBG", False),
@@ -179,11 +191,9 @@ def projected(longitude, latitude) -> tuple[np.ndarray, np.ndarray]:
 
 def draw(table: pd.DataFrame, spacing: float, title: str, path: Path) -> None:
     """A map of each column from above the pole, and below it the same by latitude."""
-    import textwrap
-
     import matplotlib.pyplot as plt
 
-    figure, grid = plt.subplots(2, len(PANELS), figsize=(13, 5.8), layout="constrained", height_ratios=(2.6, 1))
+    figure, grid = plt.subplots(2, len(PANELS), figsize=(13, 5.2), layout="constrained", height_ratios=(2.6, 1))
     latitudes = np.unique(table.latitude_deg)
     for number, (column, label, colours, signed) in enumerate(PANELS):
         above, below = grid[:, number]
@@ -208,7 +218,7 @@ def draw(table: pd.DataFrame, spacing: float, title: str, path: Path) -> None:
         below.set(xlabel="latitude, degN", xlim=(latitudes[0], latitudes[-1]))
         below.spines[["top", "right"]].set_visible(False)
     grid[1, 0].set_ylabel("median, and\n80 % of the stands")
-    figure.suptitle(textwrap.fill(title, 150), fontsize=10)
+    figure.suptitle(title, fontsize=11)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=150, metadata={"Software": None})
     plt.close(figure)
@@ -229,6 +239,15 @@ def cell_values(table: pd.DataFrame, column: str, spacing: float):
 
 def main(args: Args) -> None:
     """Simulate, and write table and figure."""
+    path = paths.studies(args.quick) / "boreal_map.csv"
+    figure = path.with_suffix(".png") if args.quick else FIGURE
+    if args.redraw:
+        if not path.exists():
+            protocol.fail(f"--redraw: no {path} yet; without --redraw it is made")
+        table, settings = stored.read(path), stored.settings(path)
+        draw(table, settings["spacing"], title(table, settings), figure)
+        print(f"wrote {figure}")
+        return
     if args.quick:
         args.spacing, args.years = 4.0, 3
     name, env_id, policy = policy_of(args)
@@ -236,7 +255,6 @@ def main(args: Args) -> None:
         protocol.fail(f"--env-id {env_id}: allowed are {', '.join(boreal_env.REGISTERED)}")
     world = {key: value for key, value in gym.spec(env_id).kwargs.items() if key != "mode"}
     table = study(args, name, world, policy, paths.runs(args.quick) / "boreal_map")
-    path = paths.studies(args.quick) / "boreal_map.csv"
     settings = {
         "policy": name,
         "env_id": env_id,
@@ -246,10 +264,8 @@ def main(args: Args) -> None:
         "years": args.years,
     }
     stored.write(path, table, settings)
-    title = sentences(table, args.preference, args.years)
-    print(title)
-    figure = path.with_suffix(".png") if args.quick else FIGURE
-    draw(table, args.spacing, title, figure)
+    print(sentences(table, args.preference, args.years))
+    draw(table, args.spacing, title(table, settings), figure)
     print(f"wrote {path} and {figure}")
 
 
