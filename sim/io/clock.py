@@ -12,7 +12,7 @@ from sim.io.table import Table
 DAY = 1440  # minutes
 MOST_MINUTES = 120
 _FORMATS = {8: "%Y%m%d", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
-_WITH_ZONE = re.compile(r":\d\d(\.\d+)?\s?(Z|[+-]\d\d(:?\d\d)?)$")
+_WITH_ZONE = re.compile(r":\d\d(?:\.\d+)?\s?(?:Z|[+-]\d\d(?::?\d\d)?)$")
 
 
 def read_times(table: Table, texts: pd.Series, name: str) -> pd.DatetimeIndex:
