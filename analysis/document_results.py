@@ -21,7 +21,7 @@ from analysis.figures import learning_asymmetry, learning_curves, learning_diffi
 from analysis.results import Results
 from analysis.tables import distance_to_best, main_results, runtime, single_sites
 from analysis.tables import learning_difficulty as difficulty_table
-from analysis.tables.common import has_numbers, over_seeds, readable
+from analysis.tables.common import has_numbers, over_seeds
 from cleanrl_style import protocol
 
 PAGES = (
@@ -183,13 +183,21 @@ def distances(results: Results) -> str:
     return text
 
 
+#: Of the table `learning_difficulty`, rows that docs/learning.md does not show.
+DIFFICULTY_LEFT_OUT = "one year|one choice|discounted|GAE|total utility| x "
+
+
 def difficulty(results: Results) -> str:
     """What the returns vary with, effects of actions against their noise, and how much of a gradient is noise."""
     table = difficulty_table.make(results)
     if not has_numbers(table, difficulty_table.COLUMNS):
         return f"Not run yet: `{difficulty_table.MADE_BY}`.\n"
-    text = readable(table, difficulty_table.COLUMNS)
-    return excerpts.markdown(list(text), text.to_numpy().tolist())
+    table = table[~(table["of"] + table.quantity).str.contains(DIFFICULTY_LEFT_OUT)]
+    cells = [
+        [row["of"], row.quantity, *(excerpts.with_interval(row, objective) for objective in ("carbon", "thaw"))]
+        for _, row in table.iterrows()
+    ]
+    return excerpts.markdown(list(difficulty_table.COLUMNS.values()), cells)
 
 
 def sites_alone(results: Results) -> str:

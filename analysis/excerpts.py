@@ -4,6 +4,7 @@ scaling and maps, and of docs/validation.md, as Markdown."""
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from analysis import paths, stored
@@ -165,6 +166,22 @@ def gradient() -> str:
         f"{episodes(gradient_noise.NONE, 'thaw')} and {episodes(gradient_noise.SITE, 'thaw')}. "
         "A training has 6,000 episodes.\n"
     )
+
+
+def with_interval(row, name: str) -> str:
+    """A number of a table to two digits, with its 95 % interval where it has one."""
+    value, low, high = (row.get(key, np.nan) for key in (name, f"{name}_low", f"{name}_high"))
+    if pd.isna(value):
+        return ""
+    return two_digits(value) if pd.isna(low) else f"{two_digits(value)} [{two_digits(low)}, {two_digits(high)}]"
+
+
+def two_digits(value: float) -> str:
+    """1,500,000, 24, 0.13, -0.001."""
+    if np.isinf(value):
+        return "∞"
+    rounded = float(f"{value:.2g}")
+    return f"{rounded:,.0f}" if abs(rounded) >= 10 else f"{rounded:g}"
 
 
 def first_run() -> str:

@@ -25,6 +25,7 @@ COMPONENTS = {
 REST = "#DDDDDD"
 OF = {"carbon": ("#009E73", "o"), "thaw": ("#0072B2", "s")}
 TRAINING_EPISODES = 6000
+COURSE = "conifers, not deciduous"  # both of its effects can be told from none
 
 
 def draw(figure, results) -> None:
@@ -36,7 +37,7 @@ def draw(figure, results) -> None:
         [
             "what varies",
             "an action's effect and the noise",
-            "planting conifers: when the effect comes",
+            "conifers, not deciduous: when the effect comes",
             "episodes to tell two actions apart",
         ],
     )
@@ -108,7 +109,7 @@ def draw_noise(ax, cases) -> None:
 def draw_course(ax, years) -> None:
     """The effect so far as a share of the whole, and how much later rewards weigh in an advantage."""
     for objective, (colour, marker) in OF.items():
-        effect = years[(years.contrast == "plant conifers") & (years.objective == objective)].effect.to_numpy()
+        effect = years[(years.contrast == COURSE) & (years.objective == objective)].effect.to_numpy()
         ax.plot(
             np.cumsum(effect) / effect.sum(),
             color=colour,
