@@ -3,7 +3,6 @@
 A player is a function of a `Stand` that gives an action.
 """
 
-import pickle
 from collections.abc import Callable
 from pathlib import Path
 
@@ -66,10 +65,7 @@ def trained(folder: str, stand: Stand, greedy: bool) -> Player:
     Raises FileNotFoundError where there is none, ValueError for one that cannot be read or does not know the stand's
     observation.
     """
-    try:
-        policy = protocol.load_policy(folder)
-    except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError) as error:
-        raise ValueError(f"{folder}: its policy.pt or config.json cannot be read") from error
+    policy = protocol.load_policy(folder)
 
     def probabilities(stand: Stand) -> np.ndarray:
         return policy(stand.observation[None], stand.masks[None], stand.returns[None])
