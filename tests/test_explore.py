@@ -246,6 +246,7 @@ def test_the_page_in_a_browser(tmp_path):
     if browser.program() is None:
         pytest.skip(f"no browser: one of {', '.join(browser.PROGRAMS)} has to be installed")
     with browser.served(tmp_path) as address, browser.opened(address, 1280, 900) as tab:
+        tab.set_default_timeout(120_000)  # of a machine that compiles the physics beside it
         requests, problems = [], []
         tab.on("request", lambda request: requests.append(request.url))
         tab.on("pageerror", lambda error: problems.append(str(error)))
