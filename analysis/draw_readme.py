@@ -40,7 +40,7 @@ def main(policy: str = "ppo_group-balanced", preference: float = 0.5, images: Pa
     """
     try:
         trained = protocol.load_policy(policy)
-    except FileNotFoundError as error:
+    except (FileNotFoundError, ValueError) as error:
         protocol.fail(f"--policy {error}")
     images.mkdir(parents=True, exist_ok=True)
     with protocol.replacing(images / "stand.png") as file:

@@ -11,12 +11,12 @@ from typing import NamedTuple
 from analysis import paths
 from analysis.methods import LEARNERS, METHODS, OUTSIDE, STRATEGIES
 from analysis.runs import SITE_SPECIFIC, setting
+from boreal_env import REGISTERED
 from cleanrl_style.protocol.arguments import DEFAULT_STEPS
 
 ROOT = Path(__file__).parents[1]
 GENERALIST, BALANCED, ONE_SITE = "boreal-generalist-v0", "boreal-balanced-v0", "boreal-site-specific-v0"
 OTHER_WORLDS = ("boreal-timber-v0", "boreal-four-v0", "boreal-warming-v0")
-OBJECTIVES_OF = {"boreal-timber-v0": 3, "boreal-four-v0": 4}  # of all others 2
 STUDIES = (
     "constant_plans",
     "training_gains",
@@ -355,8 +355,8 @@ def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path | None = None) -> list[Jo
             steps = QUICK_STEPS_ALONE if alone else QUICK_STEPS
             flags["total_timesteps"] = steps * job.steps // DEFAULT_STEPS[job.mode]
         flags |= QUICK_EVALUATION | (QUICK_POPULATION if job.script == "moea" else {})
-        if (objectives := OBJECTIVES_OF.get(job.env_id, 2)) > 2:
-            flags["eval_weights"] = tuple(float(k == i) for i in range(objectives) for k in range(objectives))
+        if names := REGISTERED[job.env_id].get("objectives"):  # more than two: each alone
+            flags["eval_weights"] = tuple(float(one == other) for one in names for other in names)
         if "preference" in flags:
             del flags["eval_weights"]  # an agent of one weight is evaluated at it
         flags["run_dir"] = (runs_dir or paths.runs(quick=True)) / f"{number:02d}-{job.script}"

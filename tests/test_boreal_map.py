@@ -55,5 +55,7 @@ def test_what_is_not_there_cannot_be_drawn_again(tmp_path, monkeypatch):
 
 
 def test_unknown_policies_end_the_script(tmp_path):
-    with pytest.raises(SystemExit, match="--policy nobody: neither a run's folder, nor a policy that ships"):
+    with pytest.raises(
+        SystemExit, match="--policy nobody: neither the folder .* a fixed strategy is zero_change, plus_100"
+    ):
         boreal_map.main(boreal_map.Args("nobody"))

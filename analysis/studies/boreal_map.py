@@ -10,7 +10,6 @@ Leaves results/studies/boreal_map.csv, a row a point, and docs/images/boreal_map
 runs/boreal_map, and the same command goes on where it was killed.
 """
 
-import contextlib
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ import pandas as pd
 import boreal_env
 import sim
 from analysis import paths, stored
+from analysis.methods import STRATEGIES
 from cleanrl_style import protocol
 from sim.executor import HERE
 from sim.management import decode
@@ -63,17 +63,17 @@ class Args:
 
 def policy_of(args: Args) -> tuple[str, str, Callable]:
     """Name, environment and function of a policy."""
-    with contextlib.suppress(FileNotFoundError):
-        policy = protocol.load_policy(args.policy)
-        import torch
-
-        torch.set_num_threads(1)  # sums are in one order, whatever the machine; the network is small
-        return f"{policy.script}-seed{policy.arguments['seed']}", args.env_id or policy.env_id, policy
-    try:
+    if args.policy in STRATEGIES:
         module = importlib.import_module(f"baselines_heuristic.{args.policy}")
-    except ModuleNotFoundError:
-        protocol.fail(f"--policy {args.policy}: neither a run's folder, nor a policy that ships, nor a fixed strategy")
-    return args.policy, args.env_id or BALANCED, module.policy
+        return args.policy, args.env_id or BALANCED, module.policy
+    try:
+        policy = protocol.load_policy(args.policy)
+    except (FileNotFoundError, ValueError) as error:
+        protocol.fail(f"--policy {error}; a fixed strategy is {', '.join(STRATEGIES)}")
+    import torch
+
+    torch.set_num_threads(1)  # sums are in one order, whatever the machine; the network is small
+    return f"{policy.script}-seed{policy.arguments['seed']}", args.env_id or policy.env_id, policy
 
 
 def outlines() -> list[np.ndarray]:
