@@ -111,8 +111,9 @@ def region_killed() -> str:
     row = pd.read_csv(path).iloc[0]
     outcome = "the same bytes as" if row.same_bytes else "OTHER BYTES THAN"
     return (
-        f"Measured: {row.stands:,} stands under a trained policy for {row.years} years, in steps of {row.step_minutes} minutes, killed {row.kills} times and "
-        f"gone on with, gave {outcome} a run that was left alone, in at most {row.peak_mb} MB of memory.\n"
+        f"Measured: {row.stands:,} stands under a trained policy for {row.years} years, in steps of {row.step_minutes} "
+        f"minutes, killed {row.kills} times and gone on with, gave {outcome} a run that was left alone, in at most "
+        f"{row.peak_mb} MB of memory.\n"
     )
 
 
