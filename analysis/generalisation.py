@@ -206,6 +206,8 @@ def searched_plans(task: protocol.Task) -> pd.DataFrame | None:
 def main(args: Args) -> None:
     """Judge the runs on every split, print the summary, write the sites' ratios."""
     try:
+        if args.episodes < 1:
+            raise ValueError(f"--episodes {args.episodes}: 1 or more are allowed")
         configs = {folder: runs.read_config(folder) for folder in args.runs}
         tasks = [task_of(config) for config in configs.values()]
         if not tasks or len({task.env_id for task in tasks}) > 1 or not tasks[0].draws_sites:

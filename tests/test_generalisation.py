@@ -218,5 +218,7 @@ def test_a_split_or_a_run_that_is_not_there(run, tmp_path):
         judge(folder, split=("hotter",))
     with pytest.raises(SystemExit, match="it was evaluated on 2 of the 3 sites"):
         generalisation.main(generalisation.Args(runs=(folder,), episodes=3))
+    with pytest.raises(SystemExit, match="--episodes 0: 1 or more are allowed"):
+        generalisation.main(generalisation.Args(runs=(folder,), episodes=0))
     with pytest.raises(SystemExit, match="config.json"):
         judge(tmp_path / "nowhere")
