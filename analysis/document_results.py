@@ -252,7 +252,7 @@ def splits(results: Results) -> str:
     for name, moved in SHIFTS.items():
         worlds = [world for world in ("balanced", "sampled") if name in shifts_of(world)]
         parts = [
-            f"`{parameter}` {low:g} to {high:g}, beside {one.low:g} to {one.high:g}"
+            f"`{parameter}` {low:g} to {high:g} (sampled: {one.low:g} to {one.high:g})"
             for parameter, (low, high) in moved.items()
             for one in (sim.SITE_PARAMETERS[parameter],)
         ]
@@ -281,7 +281,7 @@ def on_other_sites(results: Results) -> str:
             cells.append("" if np.isnan(score) else f"{score:.0f}")
             for name in generalisation.RATIOS:
                 inside = row["split"] in (generalisation.TEST, generalisation.SEARCHED)
-                drop, low, high = (row[f"{name}_drop{end}"] for end in ("", "_low", "_high"))
+                drop, low, high = (round(row[f"{name}_drop{end}"], 2) + 0.0 for end in ("", "_low", "_high"))
                 cells += [f"{row[name]:.2f}", "" if inside else f"{drop:.2f} [{low:.2f}, {high:.2f}]"]
             rows.append(cells)
     if not rows:

@@ -210,8 +210,9 @@ def main(args: Args) -> None:
             raise ValueError(f"--episodes {args.episodes}: 1 or more are allowed")
         configs = {folder: runs.read_config(folder) for folder in args.runs}
         tasks = [task_of(config) for config in configs.values()]
-        if not tasks or len({task.env_id for task in tasks}) > 1 or not tasks[0].draws_sites:
-            raise ValueError("one run or more are allowed, of one boreal environment that draws its sites")
+        env_ids = sorted({task.env_id for task in tasks})
+        if len(env_ids) != 1 or not tasks[0].draws_sites:
+            raise ValueError(f"runs of {', '.join(env_ids)}: one boreal environment that draws its sites is allowed")
         splits = splits_of(tasks[0], args.split)
         scores, found = {}, {}
         for split in splits:

@@ -106,7 +106,7 @@ def test_the_splits_of_sites_and_the_policies_on_them(tmp_path):
     results = Results((tmp_path,), experiments.jobs(), tmp_path)
     table = document_results.section(results, "splits")
     assert "| `training` | 1000 to 1999 |" in table and "| `test` | 200 of `evaluation_sites.csv` |" in table
-    assert "| `calmer` | those of `test` | `wind_speed_m_s` 0.4 to 1, beside 1 to 5 |" in table
+    assert "| `calmer` | those of `test` | `wind_speed_m_s` 0.4 to 1 (sampled: 1 to 5) |" in table
     assert document_results.section(results, "generalisation").startswith("Not run yet: `python analysis/gen")
 
     names = [f"runs/ppo_group/boreal-balanced-v0/seed2, {policy}" for policy in ("greedy", "sampled")]
