@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import excerpts, experiments, main_points, methods, metrics, paths
+import sim
+from analysis import excerpts, experiments, generalisation, main_points, methods, metrics, paths, stored
 from analysis.experiments import BALANCED, GENERALIST
 from analysis.figures import learning_asymmetry, learning_curves, learning_difficulty
 from analysis.results import Results
@@ -23,12 +24,15 @@ from analysis.tables import distance_to_best, main_results, runtime, single_site
 from analysis.tables import learning_difficulty as difficulty_table
 from analysis.tables.common import has_numbers, over_seeds
 from cleanrl_style import protocol
+from cleanrl_style.protocol import sites
+from sim.task.shifts import SHIFTS, shifts_of
 
 PAGES = (
     "README.md",
     "docs/start.md",
     "docs/learning.md",
     "docs/performance.md",
+    "docs/planners.md",
     "docs/results.md",
     "docs/scaling.md",
     "docs/outside.md",
@@ -230,6 +234,61 @@ def other_libraries(results: Results) -> str:
     return text if rows else not_run("outside")
 
 
+#: Split -> what it is for; the shifts besides.
+SPLITS = {
+    "training": "the first episodes of `--seed 1`; a training goes on to ever new sites, all with seeds below 10⁹",
+    "validation": "variants and budgets are chosen on them; no training learns from them",
+    "test": "results are of them; nothing was chosen on them",
+}
+
+
+def splits(results: Results) -> str:
+    """The splits of sites: seeds, what each is for, and what is moved outside the sampled range."""
+    rows = []
+    for name, text in SPLITS.items():
+        seeds = sites.published_seeds(name)
+        which = f"{seeds[0]} to {seeds[-1]}" if name == "training" else f"{len(seeds)} of `{sites.TABLE}`"
+        rows.append([f"`{name}`", which, text])
+    for name, moved in SHIFTS.items():
+        worlds = [world for world in ("balanced", "sampled") if name in shifts_of(world)]
+        parts = [
+            f"`{parameter}` {low:g} to {high:g} (sampled: {one.low:g} to {one.high:g})"
+            for parameter, (low, high) in moved.items()
+            for one in (sim.SITE_PARAMETERS[parameter],)
+        ]
+        only = "" if len(worlds) == 2 else f"; only where the boundary is {worlds[0]}"
+        rows.append([f"`{name}`", "those of `test`", "; ".join(parts) + only])
+    return excerpts.markdown(["split", "seeds", "sites"], rows)
+
+
+def on_other_sites(results: Results) -> str:
+    """Score, NHGR and EUGR of the policies that were judged inside and outside the sampled range, the greedy ones."""
+    rows = []
+    for path in sorted((results.studies_dir / "generalisation").glob("*.csv")):
+        scores = {(policy, split): score for policy, split, score in stored.settings_of(path)["scores"]}
+        of_splits = dict(tuple(stored.read(path).groupby("split", sort=False)))
+        for row in generalisation.summaries(of_splits).to_dict("records"):
+            folder, _, policy = row["policy"].rpartition(", ")
+            if policy != "greedy":
+                continue
+            script, _, seed = Path(folder).parts[-3:]
+            score = scores.get((row["policy"], row["split"]), np.nan)
+            cells = [
+                f"{methods.title(script)}, {seed.replace('seed', 'seed ')}, `{path.stem}`",
+                row["split"],
+                str(row["sites"]),
+            ]
+            cells.append("" if np.isnan(score) else f"{score:.0f}")
+            for name in generalisation.RATIOS:
+                inside = row["split"] in (generalisation.TEST, generalisation.SEARCHED)
+                drop, low, high = (round(row[f"{name}_drop{end}"], 2) + 0.0 for end in ("", "_low", "_high"))
+                cells += [f"{row[name]:.2f}", "" if inside else f"{drop:.2f} [{low:.2f}, {high:.2f}]"]
+            rows.append(cells)
+    if not rows:
+        return "Not run yet: `python analysis/generalisation.py RUN`.\n"
+    return excerpts.markdown(["policy", "split", "sites", "score", "NHGR", "drop", "EUGR", "drop"], rows)
+
+
 def section(results: Results, name: str) -> str:
     """What stands between the comments: of all methods in a world, of the heuristics, of one script, another table."""
     if name in EXCERPTS:
@@ -276,6 +335,8 @@ TABLES = {
     "six_rows": main_points.six_rows,
     "in_words": main_points.in_words,
     "outside": other_libraries,
+    "splits": splits,
+    "generalisation": on_other_sites,
     "difficulty": difficulty,
     **{f"figure_{name}": figure_of(name) for name in FIGURES},
 }

@@ -3,11 +3,11 @@
     python analysis/generalisation.py RUN [RUN ..]                      # outside: four shifts of the test sites
     python analysis/generalisation.py RUN --split validation calmer     # or any splits
 
-A split is the test or validation sites, or the test sites with one property, or two, moved out of the range that sites
-are drawn from (`sim/task/shifts.py`); "outside" is all of those. The test sites are always there, to compare with. A
-run is a finished one with its policy.pt; on the test sites its own evaluation counts, and an archived run will do.
-Printed are, for both policies, the score against the constant plans of the split, two ratios, and how much each drops
-outside.
+A split is the test, validation or training sites, or the test sites with one property, or two, moved out of the range
+that sites are drawn from (`sim/task/shifts.py`); "outside" is all of those. The test sites are always there, to compare
+with. A run is a finished one with its policy.pt; on the test sites its own evaluation counts, and an archived run will
+do. Printed are, for both policies, the score against the constant plans of the split, two ratios, and how much each
+drops outside; the ratios of every site are written. docs/results.md shows those of the policies that ship.
 
 The ratios are those of Teoh, Varakantham and Vamplew (2025, ICLR, "On generalization across environments in
 multi-objective reinforcement learning"): NHGR is the hypervolume of a policy's front over that of the site's best known
@@ -107,8 +107,8 @@ def ratios(policies: Mapping[str, pd.DataFrame], best: pd.DataFrame) -> pd.DataF
 
 def summary(by_split: Mapping[str, pd.DataFrame], inside: str) -> pd.DataFrame:
     """Means over sites of `RATIOS` by policy and split, and the drop from inside to each other split, with 95 % t
-    intervals: paired by site, since a shift keeps the sites' seeds. Sites without a ratio do not
-    count in it.
+    intervals: paired by site, since a shift keeps the sites' seeds. A split of other sites has no drop. Sites without
+    a ratio do not count.
 
     by_split : split -> what `ratios` gave; inside : the split within the sampled range.
     """
@@ -117,16 +117,14 @@ def summary(by_split: Mapping[str, pd.DataFrame], inside: str) -> pd.DataFrame:
     tables = {split: table.set_index(["policy", "site_seed"]).sort_index() for split, table in by_split.items()}
     rows = []
     for split, table in tables.items():
-        if not table.index.equals(tables[inside].index):
-            raise ValueError(
-                f"split {split!r} has not the policies and site seeds of {inside!r}: they cannot be paired"
-            )
+        paired = table.index.equals(tables[inside].index)
         for policy in table.index.unique("policy"):
             here, there = table.loc[policy], tables[inside].loc[policy]
             row = {"policy": policy, "split": split, "sites": len(here)}
             for name in RATIOS:
                 row |= metrics.with_interval(name, here[name].dropna().to_numpy())
-                row |= metrics.with_interval(f"{name}_drop", (there[name] - here[name]).dropna().to_numpy())
+                if paired:
+                    row |= metrics.with_interval(f"{name}_drop", (there[name] - here[name]).dropna().to_numpy())
             rows.append(row)
     return pd.DataFrame(rows)
 
@@ -141,11 +139,11 @@ class Args:
     runs: tyro.conf.Positional[tuple[Path, ...]]
     """folders of finished runs, of one environment"""
     split: tuple[str, ...] = (OUTSIDE,)
-    """test, validation, a shift such as calmer, or outside: all shifts"""
+    """test, validation, training, a shift such as calmer, or outside: all shifts"""
     episodes: int = 50
     """the first sites of each split"""
     output: Path | None = None
-    """table of each policy, split and site (None: results/studies/generalisation.csv)"""
+    """table of each policy, split and site (None: results/studies/generalisation/<environment>.csv)"""
 
 
 def task_of(config: dict) -> protocol.Task:
@@ -208,10 +206,13 @@ def searched_plans(task: protocol.Task) -> pd.DataFrame | None:
 def main(args: Args) -> None:
     """Judge the runs on every split, print the summary, write the sites' ratios."""
     try:
+        if args.episodes < 1:
+            raise ValueError(f"--episodes {args.episodes}: 1 or more are allowed")
         configs = {folder: runs.read_config(folder) for folder in args.runs}
         tasks = [task_of(config) for config in configs.values()]
-        if not tasks or len({task.env_id for task in tasks}) > 1 or not tasks[0].draws_sites:
-            raise ValueError("one run or more are allowed, of one boreal environment that draws its sites")
+        env_ids = sorted({task.env_id for task in tasks})
+        if len(env_ids) != 1 or not tasks[0].draws_sites:
+            raise ValueError(f"runs of {', '.join(env_ids)}: one boreal environment that draws its sites is allowed")
         splits = splits_of(tasks[0], args.split)
         scores, found = {}, {}
         for split in splits:
@@ -230,19 +231,24 @@ def main(args: Args) -> None:
                 found[SEARCHED] = judged(evaluations, best[best.seed.isin(seeds)])
     except (ValueError, FileNotFoundError) as error:
         sys.exit(f"error: {error}")
-    path = args.output or paths.studies() / "generalisation.csv"
+    path = args.output or paths.studies() / "generalisation" / f"{tasks[0].env_id}.csv"
     settings = {"runs": [str(folder) for folder in args.runs], "episodes": args.episodes, "splits": splits}
-    stored.write(path, pd.concat([table.assign(split=split) for split, table in found.items()]), settings)
-    report(found, scores)
+    scored = [[policy, split, round(score, 4)] for (policy, split), score in scores.items()]
+    table = pd.concat([table.assign(split=split) for split, table in found.items()])
+    stored.write(path, table, settings | {"scores": scored})
+    report(summaries(found), scores)
     print(f"\nwrote {path}")
 
 
-def report(found: Mapping[str, pd.DataFrame], scores: Mapping[tuple, float]) -> None:
-    """Print the means over sites by policy and split, with the drop from the test sites and its 95 % interval."""
-    searched = {name: table for name, table in found.items() if name == SEARCHED}
+def summaries(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """`summary` of the splits against the test sites, and of those with searched plans by themselves."""
     parts = [summary({name: table for name, table in found.items() if name != SEARCHED}, TEST)]
-    parts += [summary(searched, SEARCHED)] if searched else []
-    table = pd.concat(parts, ignore_index=True)
+    parts += [summary({SEARCHED: found[SEARCHED]}, SEARCHED)] if SEARCHED in found else []
+    return pd.concat(parts, ignore_index=True)
+
+
+def report(table: pd.DataFrame, scores: Mapping[tuple, float]) -> None:
+    """Print `summaries` by policy and split, with the drop from the test sites and its 95 % interval."""
     for policy, rows in table.groupby("policy", sort=False):
         print(f"\n{policy}\n{'split':18s} sites  score   NHGR  drop (95 %)            EUGR  drop (95 %)")
         for row in rows.to_dict("records"):
@@ -250,7 +256,8 @@ def report(found: Mapping[str, pd.DataFrame], scores: Mapping[tuple, float]) -> 
             line = f"{row['split']:18s} {row['sites']:5d}" + (" " * 7 if np.isnan(score) else f"{score:7.0f}")
             for name in RATIOS:
                 drop, low, high = (row[f"{name}_drop{end}"] for end in ("", "_low", "_high"))
-                shown = "" if row["split"] in (TEST, SEARCHED) else f"{drop:+.2f} ({low:+.2f} .. {high:+.2f})"
+                alone = row["split"] in (TEST, SEARCHED) or np.isnan(drop)
+                shown = "" if alone else f"{drop:+.2f} ({low:+.2f} .. {high:+.2f})"
                 line += f"  {row[name]:5.2f}  {shown:21s}"
             print(line.rstrip())
 

@@ -101,7 +101,7 @@ def _check_column(name: str, values, years) -> np.ndarray:
     try:
         numbers = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"scenario {name}: a number for each year is allowed, got {values!r}") from None
+        raise ValueError(f"scenario {name}: a number for each year is allowed, got {_no_number(values)!r}") from None
     if numbers.ndim != 1 or not len(numbers):
         raise ValueError(f"scenario {name}: a number for each year is allowed, got {values!r}")
     if years is None:
@@ -116,6 +116,16 @@ def _check_column(name: str, values, years) -> np.ndarray:
         k = int(np.argmax(wrong))
         raise ValueError(f"scenario {name} = {numbers[k]:g} in {years[k]}: [{low:g}, {high:g}] {unit} is allowed")
     return numbers
+
+
+def _no_number(values):
+    """The first of values that is none, or all of them."""
+    for value in np.ravel(np.asarray(values, dtype=object)):
+        try:
+            float(value)
+        except (TypeError, ValueError):
+            return value
+    return values
 
 
 def _years(values):

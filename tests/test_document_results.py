@@ -2,10 +2,11 @@ import re
 import shutil
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from tiny_runs import TINY_RUNS, write_run
 
-from analysis import document_results, experiments, main_points, methods
+from analysis import document_results, experiments, main_points, methods, stored
 from analysis.results import Results
 
 ROOT = Path(__file__).parents[1]
@@ -79,7 +80,8 @@ def test_every_section_without_runs_names_a_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     results = Results((), experiments.jobs(), tmp_path / "none")
     names = {name for text in texts for _, name, _ in document_results.SECTION.findall(text)}
-    for name in names - {"speed", "shares", "towers", "misses", "six_rows", "boreal_map", "scaling", "region_killed"}:
+    need_none = {"speed", "shares", "towers", "misses", "six_rows", "boreal_map", "scaling", "region_killed", "splits"}
+    for name in names - need_none:
         assert re.search(r"[Nn]ot (run|timed) yet: `python analysis/", document_results.section(results, name)), name
     assert document_results.section(results, "six_rows").count("not run yet") == len(main_points.SIX)
 
@@ -97,3 +99,22 @@ def test_a_page_without_a_section_is_named(pages):
     (pages / "README.md").write_text("nothing")
     with pytest.raises(SystemExit, match="README.md: no section of results"):
         document_results.main(document_results.Args(runs_dir=(TINY_RUNS,), root=pages))
+
+
+def test_the_splits_of_sites_and_the_policies_on_them(tmp_path):
+    """Two sites; outside the greedy policy has half of its ratios on one."""
+    results = Results((tmp_path,), experiments.jobs(), tmp_path)
+    table = document_results.section(results, "splits")
+    assert "| `training` | 1000 to 1999 |" in table and "| `test` | 200 of `evaluation_sites.csv` |" in table
+    assert "| `calmer` | those of `test` | `wind_speed_m_s` 0.4 to 1 (sampled: 1 to 5) |" in table
+    assert document_results.section(results, "generalisation").startswith("Not run yet: `python analysis/gen")
+
+    names = [f"runs/ppo_group/boreal-balanced-v0/seed2, {policy}" for policy in ("greedy", "sampled")]
+    rows = [(name, site, 0.8, 1.0, "test") for name in names for site in (1, 2)]
+    rows += [(name, site, 0.4 * site, 1.0, "calmer") for name in names for site in (1, 2)]
+    table = pd.DataFrame(rows, columns=["policy", "site_seed", "nhgr", "eugr", "split"])
+    scores = [[names[0], "test", 96.2], [names[0], "calmer", 61.0]]
+    stored.write(tmp_path / "generalisation" / "boreal-balanced-v0.csv", table, {"scores": scores})
+    _, _, inside, outside = document_results.section(results, "generalisation").splitlines()
+    assert inside == "| Group PPO, seed 2, `boreal-balanced-v0` | test | 2 | 96 | 0.80 |  | 1.00 |  |"
+    assert outside.startswith("| Group PPO, seed 2, `boreal-balanced-v0` | calmer | 2 | 61 | 0.60 | 0.20 [")

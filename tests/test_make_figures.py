@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 from tiny_runs import TINY_RUNS, write_run, write_run_of_three
 
 from analysis import experiments, make_figures, make_tables, methods
-from analysis.figures import algorithm_comparison, many_objectives, training_dynamics
+from analysis.figures import algorithm_comparison, common, many_objectives, training_dynamics
 from analysis.figures.common import no_data
 from analysis.results import Results
 
@@ -136,3 +136,10 @@ def test_figures_of_the_quick_jobs_are_drawn():
     results = Results((TINY_RUNS,), experiments.quick_jobs(), TINY_RUNS / "no studies")
     for module in make_figures.FIGURES:
         assert make_figures.draw(module, results).get_axes()
+
+
+def test_there_are_letters_for_any_number_of_panels():
+    axes = Figure().subplots(30)
+    common.letter(axes, ["title"] * 30)
+    names = [ax.get_title(loc="left").split()[0] for ax in axes]
+    assert names[:2] == ["(a)", "(b)"] and names[25:27] == ["(z)", "(aa)"] and len(set(names)) == 30

@@ -178,7 +178,7 @@ BAD = {
     "column": ({"warming": [1.0] * 4}, r"unknown column 'warming' of the scenario; allowed: year, warming_k, "),
     "nothing": ({}, r"the scenario has no column; allowed: warming_k"),
     "one number": ({"warming_k": 1.0}, r"scenario warming_k: a number for each year is allowed, got 1.0"),
-    "text": ({"warming_k": ["a"] * 4}, r"scenario warming_k: a number for each year is allowed"),
+    "text": ({"warming_k": [1.0, "a", 1.0, 1.0]}, r"scenario warming_k: a number for each year is allowed, got 'a'$"),
     "short": ({"warming_k": [1.0] * 3}, r"years = 4: the scenario has 3 years, so at most 3 are allowed"),
     "unequal": ({"warming_k": [1.0] * 4, "co2_ppm": [400] * 5}, r"columns are not equally long: .*: 4.*: 5"),
     "gap": ({"warming_k": [1.0, 1.0, NAN, 1.0]}, r"scenario warming_k = nan in 2027: \[-10, 15\] K is allowed"),

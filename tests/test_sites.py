@@ -60,10 +60,15 @@ def test_an_evaluation_takes_the_first_sites():
     assert protocol.evaluation_seeds(task, 3) == TABLE.seed[:3].tolist()
     for message, arguments in {
         "201 episodes: the test split has 200 sites": (201,),
-        "split 'train': allowed are test, validation, warmer_boundary, further_north, calmer, less_snow": (3, "train"),
+        "split 'train': allowed are test, validation, training, warmer_boundary, .*, calmer, less_snow": (3, "train"),
     }.items():
         with pytest.raises(ValueError, match=message):
             protocol.evaluation_seeds(task, *arguments)
+
+
+def test_the_training_split_is_where_a_training_begins():
+    seeds = protocol.evaluation_seeds(protocol.Task.of("boreal-generalist-v0"), 3, "training")
+    assert seeds == [1 * protocol.MAX_ENVS + i for i in range(3)]  # as the scripts reset environment i with --seed 1
 
 
 @pytest.mark.parametrize(

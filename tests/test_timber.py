@@ -136,6 +136,8 @@ def test_a_table_of_ones_own(tmp_path):
         ("unit", "seedling", "line 2: sawlog_conifer has the unit 'seedling'; allowed: m3, m3 under bark$"),
         ("per_eur", "9", "line 3: per_eur is 10.63 for SEK of 2022, and 9 above; one rate is allowed"),
         ("per_eur", "0", "sawlog_conifer has the per_eur 0; a positive number"),
+        ("year", "", "line 2: sawlog_conifer has the year ''; one such as 2023 is allowed"),
+        ("currency", "", "line 2: sawlog_conifer has the currency ''; one such as EUR is allowed"),
         ("item", "sawlogs", "unknown item 'sawlogs'; allowed are sawlog_conifer"),
     ):
         write([{**rows[0], column: value}, *rows[1:]])

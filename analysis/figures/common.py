@@ -1,7 +1,9 @@
 """What all figures share: letters, curves with bands, panels without data, files with the same bytes."""
 
+import itertools
 import textwrap
 from pathlib import Path
+from string import ascii_lowercase
 
 import numpy as np
 import pandas as pd
@@ -56,9 +58,10 @@ def panels(figure: Figure, rows: int, columns: int, titles: list[str]) -> list:
 
 
 def letter(axes, titles) -> None:
-    """Title each panel with its letter."""
-    for k, (ax, title) in enumerate(zip(axes, titles, strict=True)):
-        ax.set_title(f"({'abcdefg'[k]}) {title}", loc="left")
+    """Title each panel with its letter: a to z, then aa, ab, .."""
+    letters = [*ascii_lowercase, *map("".join, itertools.product(ascii_lowercase, repeat=2))]
+    for ax, title, name in zip(axes, titles, letters[: len(titles)], strict=True):
+        ax.set_title(f"({name}) {title}", loc="left")
 
 
 def no_data(ax, *commands: str) -> None:

@@ -4,6 +4,8 @@ Parallel coordinates have an axis an objective and a line a weight. With three o
 each return besides: a corner is all weight on one objective, a point a weight of the lattice.
 """
 
+import textwrap
+
 import numpy as np
 from matplotlib.lines import Line2D
 
@@ -49,7 +51,7 @@ def drawn(objectives, followers, fixed):
         ternary = len(objectives) == 3
         ratios = [1.6, 1, 1, 1] if ternary else [1]
         axes = figure.subplots(len(tables), len(ratios), squeeze=False, width_ratios=ratios)
-        letter(axes[:, 0], [title_of(key) for key in tables])
+        letter(axes[:, 0], [textwrap.fill(title_of(key), 120 if ternary else 65) for key in tables])
         for row, table in zip(axes, tables.values(), strict=True):
             parallel(row[0], table, references, objectives, low, high)
             for k, ax in enumerate(row[1:]):

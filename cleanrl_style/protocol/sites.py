@@ -1,19 +1,24 @@
-"""The episodes of an evaluation: published sites, the same for every method, none of which a training has."""
+"""The episodes of an evaluation: published sites, the same for every method (docs/planners.md has all splits)."""
 
 import csv
 import functools
 from importlib.resources import files
 
-from cleanrl_style.flags import FIRST_EVALUATION_SEED
+from cleanrl_style.flags import FIRST_EVALUATION_SEED, MAX_ENVS
 from cleanrl_style.protocol.task import Task
 
-SPLITS = ("test", "validation")  # results are of the first; variants and budgets are chosen on the second
+SPLITS = ("test", "validation", "training")  # results are of the first; variants are chosen on the second
 TABLE = "evaluation_sites.csv"  # written by analysis/choose_sites.py
 
 
 @functools.cache
 def published_seeds(split: str) -> tuple[int, ...]:
-    """Seeds of a split's episodes, in an order of which every beginning is balanced."""
+    """Seeds of a split's episodes; of test and validation every beginning is balanced.
+
+    Training is the first episodes of the environments that `--seed 1` trains on.
+    """
+    if split == "training":
+        return tuple(range(MAX_ENVS, 2 * MAX_ENVS))
     rows = csv.DictReader((files("cleanrl_style.protocol") / TABLE).read_text(encoding="utf-8").splitlines())
     return tuple(int(row["seed"]) for row in rows if row["split"] == split)
 

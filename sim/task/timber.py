@@ -133,6 +133,9 @@ def prices_of(what: str, rows: list[dict]) -> dict[str, float]:
             raise ValueError(f"{where}: unknown item {item!r}; allowed are {', '.join(ITEMS)}")
         if item in prices:
             raise ValueError(f"{where}: {item} comes twice; each item once, of one country, is allowed")
+        for name, is_right, example in (("currency", str.isalpha, "EUR"), ("year", str.isdigit, "2023")):
+            if not is_right(row[name] or ""):
+                raise ValueError(f"{where}: {item} has the {name} {row[name]!r}; one such as {example} is allowed")
         prices[item] = in_eur(where, row)
         money = row["currency"], row["year"]
         if rates.setdefault(money, row["per_eur"]) != row["per_eur"]:
