@@ -128,7 +128,8 @@ def translated(dispatcher: Dispatcher, translate):
 
 def _recompiled(function, original, name):
     function.__qualname__ = f"{function.__qualname__}_{name}"
-    return compiled(function) if original.targetoptions.get("forceinline") else phase(function)
+    inline = bool(original.targetoptions.get("forceinline"))
+    return numba.njit(**OPTIONS, forceinline=inline, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
 def _copy(dispatcher, copies, wrap):
