@@ -5,13 +5,12 @@ python analysis/document_environment.py [--path docs/environment.md]
 
 import inspect
 import textwrap
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-
-import tyro
 
 import boreal_env
 from boreal_env import BorealEnv, BorealVectorEnv, Objective, Observed, Reward
+from cleanrl_style.flags import parse
 from sim.task.observation import observation_rows
 
 #: Key of the last step's info -> (unit, meaning).
@@ -137,14 +136,13 @@ def table(head: tuple[str, ...], rows) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def main(path: Path = Path("docs/environment.md")) -> None:
-    """Write the environment's page.
+@dataclass
+class Args:
+    """Writes the environment's page."""
 
-    Args:
-        path: file of the page
-    """
-    path.write_text(page(), encoding="utf-8")
+    path: Path = Path("docs/environment.md")
+    """file of the page"""
 
 
 if __name__ == "__main__":
-    tyro.cli(main)
+    parse(Args).path.write_text(page(), encoding="utf-8")

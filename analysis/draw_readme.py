@@ -5,11 +5,11 @@
 The stand is planted for twelve years and then left alone; the policy plays the same site and weather.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
-import tyro
 from PIL import Image
 
 import boreal_env
@@ -21,6 +21,18 @@ SEED, YEARS, PLANTING_YEARS = 7, 35, 12
 PLANT_100_HALF_CONIFER = 22
 
 
+@dataclass
+class Args:
+    """Draws stand.png and trained_policy.gif."""
+
+    policy: str = "ppo_group-balanced"
+    """name of one that ships, or folder of a training run"""
+    preference: float = 0.5
+    """weight of carbon in the animation"""
+    images: Path = Path("docs/images")
+    """folder of the pictures"""
+
+
 def stand() -> Image.Image:
     """A stand 35 years after the first trees were planted."""
     env = gym.make(BALANCED, render_mode="rgb_array")
@@ -30,16 +42,11 @@ def stand() -> Image.Image:
     return Image.fromarray(env.render())
 
 
-def main(policy: str = "ppo_group-balanced", preference: float = 0.5, images: Path = Path("docs/images")) -> None:
-    """Draw stand.png and trained_policy.gif.
-
-    Args:
-        policy: name of one that ships, or folder of a training run
-        preference: weight of carbon in the animation
-        images: folder of the pictures
-    """
+def main(args: Args) -> None:
+    """Draw both."""
+    images = args.images
     try:
-        trained = protocol.load_policy(policy)
+        trained = protocol.load_policy(args.policy)
     except (FileNotFoundError, ValueError) as error:
         protocol.fail(f"--policy {error}")
     images.mkdir(parents=True, exist_ok=True)
@@ -51,9 +58,9 @@ def main(policy: str = "ppo_group-balanced", preference: float = 0.5, images: Pa
         return trained.act(observation, mask, accrued_returns, generator)
 
     env = trained.task().make(render_mode="rgb_array")
-    frames, _ = command_line.play(env, act, SEED, np.array([preference, 1 - preference]))
+    frames, _ = command_line.play(env, act, SEED, np.array([args.preference, 1 - args.preference]))
     command_line.save_animation(images / "trained_policy.gif", frames)
 
 
 if __name__ == "__main__":
-    tyro.cli(main)
+    main(protocol.parse(Args))

@@ -9,7 +9,7 @@ import pandas as pd
 
 from analysis import paths, stored
 from analysis.studies import boreal_map as region_map
-from analysis.studies import gradient_noise, site_choice
+from analysis.studies import site_choice
 from cleanrl_style import protocol
 
 VALIDATION = Path("docs/validation.md")
@@ -152,6 +152,8 @@ def gradient() -> str:
     path = paths.studies() / "gradient_noise.csv"
     if not path.exists():
         return "Not run yet: `python analysis/studies/gradient_noise.py`.\n"
+    from analysis.studies import gradient_noise  # with torch
+
     table = stored.read(path)
     needed = table[table.utility == "future"].set_index(["baseline", "objective"])
 

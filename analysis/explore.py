@@ -9,11 +9,39 @@ needs no internet. Stands, players, charts and controls are in `analysis/explori
 import functools
 import html
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
+
+from cleanrl_style.flags import fail, parse, require
+
+
+@dataclass
+class Args:
+    """Serves the page to this machine until Ctrl-C."""
+
+    port: int = 5006
+    """port to serve it on"""
+    show: bool = True
+    """open it in a browser"""
+    runs: Path = Path("runs")
+    """folder of runs, whose trained policies can be chosen"""
+
+
+def check_flags(args: Args) -> None:
+    """End the command with one line that names a bad flag."""
+    if not 0 < args.port < 65536:
+        fail(f"--port {args.port}: 1 to 65535 are allowed")
+    if args.runs != Args.runs and not args.runs.is_dir():
+        fail(f"--runs {args.runs}: no such folder")
+
+
+if __name__ == "__main__":
+    require("panel", extra="explore")
+    args = parse(Args)  # a bad flag is answered before all that follows is loaded
+    check_flags(args)
 
 import numpy as np
 import panel as pn
-import tyro
 
 import boreal_env
 import sim
@@ -23,7 +51,6 @@ from analysis.exploring.players import trained_runs
 from analysis.exploring.site_controls import SiteControls
 from analysis.exploring.stand_card import StandCard
 from analysis.exploring.stands import YEARS, Stand
-from cleanrl_style import protocol
 
 TITLE = "Two stands, one weather"
 PLANTED_CONIFERS = {"A": 1.0, "B": 0.0}  # at first, of a hundred a year
@@ -264,31 +291,23 @@ def cumulative(rewards: np.ndarray) -> np.ndarray:
     return np.vstack([np.zeros((1, 2)), np.cumsum(rewards, axis=0)])
 
 
-def main(port: int = 5006, show: bool = True, runs: Path = Path("runs")) -> None:
-    """Serve the page to this machine until Ctrl-C.
-
-    Args:
-        port: port to serve it on
-        show: open it in a browser
-        runs: folder of runs, whose trained policies can be chosen
-    """
-
-    if not 0 < port < 65536:
-        protocol.fail(f"--port {port}: 1 to 65535 are allowed")
+def main(args: Args) -> None:
+    """Serve the page."""
     pn.extension(sizing_mode="stretch_width", raw_css=[style.BODY])
 
     def page():
-        made = Page(runs)
+        made = Page(args.runs)
         pn.state.onload(lambda: made.await_physics(compiled))
         return made.layout()
 
     compiled = ThreadPoolExecutor(1).submit(boreal_env.warm_up)
-    print(f"http://localhost:{port} has the page; Ctrl-C ends it", flush=True)
+    port, origin = args.port, f"localhost:{args.port}"
+    print(f"http://{origin} has the page; Ctrl-C ends it", flush=True)
     try:
-        pn.serve(page, port=port, address="localhost", websocket_origin=[f"localhost:{port}"], show=show, title=TITLE)
+        pn.serve(page, port=port, address="localhost", websocket_origin=[origin], show=args.show, title=TITLE)
     except OSError as error:
-        protocol.fail(f"--port {port}: {error.strerror}; another one is allowed, such as --port {port + 1}")
+        fail(f"--port {port}: {error.strerror}; another one is allowed, such as --port {port + 1}")
 
 
 if __name__ == "__main__":
-    tyro.cli(main)
+    main(args)

@@ -28,7 +28,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import tyro
+
+from cleanrl_style.flags import parse
 
 SCENARIOS = ("ssp126", "ssp245", "ssp585")
 REGIONS = ["WSB", "ESB", "NWN"]
@@ -124,4 +125,4 @@ def main(args: Args) -> None:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Args, description=__doc__))
+    main(parse(Args))

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis import paths
+from analysis import runs as finished
 from analysis.results import Results
 from analysis.tables import (
     best_known,
@@ -104,6 +105,10 @@ def main(args: Args) -> None:
     rows = results.rows  # completes left_out
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)
+    others = finished.of_another_physics(results.runs)
+    if others:
+        of = f"{len(others)} of {len(results.runs)} runs were made by another physics than this checkout's"
+        print(f"{of}, such as {others[0].folder}; --overwrite makes a run anew", file=sys.stderr)
     if not results.runs:
         where, first = ", ".join(map(str, results.roots)), next(job.command for job in results.missing if job.exists)
         protocol.fail(f"no finished run under {where}; `{first}` makes the first, `python analysis/reproduce.py` all")

@@ -14,6 +14,7 @@ import pandas as pd
 
 from analysis import paths, reduction
 from cleanrl_style.protocol import fronts
+from cleanrl_style.protocol.reference import physics_name
 
 SITE_SPECIFIC = "site-specific"  # the mode in which all episodes are of one site and weather
 ARCHIVED = "tables.zip"  # the reduced tables of an archived run
@@ -170,6 +171,11 @@ def check(evaluation: pd.DataFrame, config: dict) -> None:
         )
     if not np.isfinite(evaluation[fronts.return_columns(objectives)].to_numpy(dtype=float)).all():
         raise ValueError("damaged: evaluation.csv has returns that are not finite numbers")
+
+
+def of_another_physics(runs: list[Run]) -> list[Run]:
+    """Those that another simulator or environment than this checkout's has made; older runs do not say which."""
+    return [run for run in runs if run.config.get("physics", physics_name()) != physics_name()]
 
 
 def run_folders(root: Path) -> list[Path]:

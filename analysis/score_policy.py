@@ -8,25 +8,17 @@ docs/leaderboard.csv, in place of the row of that name, and the table into docs/
 """
 
 import re
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import gymnasium as gym
-import numpy as np
-import pandas as pd
 import tyro
 
-from analysis.excerpts import markdown
-from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts, reference, score
-from cleanrl_style.protocol.summary import followed
+from cleanrl_style.flags import fail, parse, policy_file
 
 TASKS = ("boreal-generalist-v0", "boreal-balanced-v0")
-SCORES = tuple(f"{policy}, {task}" for task in TASKS for policy in protocol.POLICIES)
-COLUMNS = ("name", "script", "trained on", "steps", *SCORES)
 PAGE, TABLE = Path("docs", "leaderboard.md"), Path("docs", "leaderboard.csv")
 SECTION = re.compile(r"(<!-- leaderboard -->\n).*?(<!-- end of leaderboard -->)", re.DOTALL)
+SITES = 200  # of the test split
 CHECKED = 8  # episodes a weight that are played again
 
 
@@ -40,7 +32,7 @@ class Args:
     """the script that trained it, if that does not lie in cleanrl_style/"""
     tasks: tuple[str, ...] = TASKS
     """environments to score it on"""
-    episodes: int = 200
+    episodes: int = SITES
     """the first of the test sites; a row of the leaderboard has all"""
     name: str | None = None
     """name of the row (None: the script's)"""
@@ -48,6 +40,44 @@ class Args:
     """put the row into the leaderboard"""
     root: Path = Path()
     """folder of docs/"""
+
+
+def check_flags(args: Args) -> None:
+    """End the command with one line for what is wrong without a look at the policy."""
+    if not 1 <= args.episodes <= SITES:
+        fail(f"--episodes {args.episodes}: 1 to {SITES} are allowed")
+    if not args.tasks:
+        fail(f"--tasks: at least one is needed, such as {TASKS[0]}")
+    if args.add and (set(args.tasks) != set(TASKS) or args.episodes != SITES):
+        fail(f"--add: a row of the leaderboard is of both tasks and all {SITES} test sites")
+    page = args.root / PAGE
+    if args.add and not (page.is_file() and SECTION.search(page.read_text(encoding="utf-8"))):
+        fail(f"--root {args.root}: no {PAGE} with <!-- leaderboard --> to <!-- end of leaderboard -->")
+    if args.name is not None and (not args.name.strip() or {"|", "\n"} & set(args.name)):
+        fail(f"--name {args.name!r}: a cell of a table, without |, is allowed")
+    if args.script is not None and not (args.script.is_file() and args.script.suffix == ".py"):
+        fail(f"--script {args.script}: a file that ends in .py, and is there, is allowed")
+    try:
+        policy_file(args.policy)
+    except FileNotFoundError as error:
+        fail(str(error))
+
+
+if __name__ == "__main__":
+    args = parse(Args)  # a bad flag is answered before all that follows is loaded
+    check_flags(args)
+
+import numpy as np
+import pandas as pd
+
+from analysis.excerpts import markdown
+from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts, reference, score
+from cleanrl_style.protocol.arguments import ask
+from cleanrl_style.protocol.summary import followed
+
+SCORES = tuple(f"{policy}, {task}" for task in TASKS for policy in protocol.POLICIES)
+COLUMNS = ("name", "script", "trained on", "steps", *SCORES)
 
 
 def check(policy: protocol.Policy, folder: Path) -> str:
@@ -98,13 +128,9 @@ def add(row: dict, root: Path) -> None:
 
 def main(args: Args) -> None:
     """Check, score, and add."""
+    for env_id in args.tasks:
+        ask(env_id, "--tasks")
     try:
-        if not 1 <= args.episodes <= 200:
-            raise ValueError(f"--episodes {args.episodes}: 1 to 200 are allowed")
-        if args.add and not SECTION.search((args.root / PAGE).read_text(encoding="utf-8")):
-            raise ValueError(f"{args.root / PAGE}: no <!-- leaderboard --> to <!-- end of leaderboard -->")
-        if args.add and (set(args.tasks) != set(TASKS) or args.episodes != 200):
-            raise ValueError("--add: a row of the leaderboard is of both tasks and all 200 test sites")
         policy = protocol.load_policy(args.policy, args.script)
         print(f"{policy.name}: {policy.script}, {check(policy, args.policy)}")
         row = {
@@ -123,9 +149,9 @@ def main(args: Args) -> None:
         if args.add:
             add(row, args.root)
             print(f"wrote {args.root / TABLE} and {args.root / PAGE}")
-    except (ValueError, OSError, gym.error.Error) as error:
-        sys.exit(f"error: {error}")
+    except (ValueError, OSError) as error:
+        fail(str(error))
 
 
 if __name__ == "__main__":
-    main(protocol.parse(Args))
+    main(args)

@@ -11,11 +11,9 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import torch
 import tyro
 
-from cleanrl_style import protocol
-from cleanrl_style.protocol import agents
+from cleanrl_style import flags, protocol
 
 LARGEST = 100_000  # bytes
 
@@ -26,7 +24,7 @@ class Args:
 
     runs: tyro.conf.Positional[tuple[Path, ...]]
     """folders of finished runs, or their policy.pt"""
-    folder: Path = Path("cleanrl_style", agents.FOLDER)
+    folder: Path = Path("cleanrl_style", flags.SHIPPED.name)
     """folder of the policies that ship"""
 
 
@@ -38,13 +36,15 @@ def name_of(run: dict) -> str:
 
 def main(args: Args) -> None:
     """Ship the policies; nothing is written unless all can be."""
+    import torch
+
     packed = {}
     for path in args.runs:
         try:
             protocol.load_policy(path)
         except (FileNotFoundError, ValueError) as error:
             sys.exit(f"error: {error}")
-        saved = torch.load(path / agents.FILE if path.is_dir() else path, weights_only=True)
+        saved = torch.load(flags.policy_file(path), weights_only=True)
         # parameters are views of one tensor, which would be saved whole
         kept = {key: value.clone() for key, value in saved["agent"].items() if not key.startswith("critic.")}
         saved["agent"] = kept

@@ -10,7 +10,10 @@ import importlib.util
 import io
 import os
 import sys
+from pathlib import Path
 
+#: A trained policy in its run's folder; the folder of those that ship.
+POLICY, SHIPPED = "policy.pt", Path(__file__).with_name("policies")
 #: Environments that a training may have, at most.
 MAX_ENVS = 1000
 #: Training resets environments with seeds below this one, evaluation from this one on.
@@ -22,6 +25,7 @@ LIMITS = {
     "site_seed": (0, 2**63 - 1),
     "total_timesteps": (1, 10**12),
     "num_envs": (1, MAX_ENVS),
+    "group_size": (1, MAX_ENVS),
     "eval_episodes": (1, 10**6),
     "eval_weights": (0, 1),
     "learning_rate": (0, 1),
@@ -30,6 +34,7 @@ LIMITS = {
     "rollout_steps": (1, 10**9),
     "minibatch_size": (2, 10**9),
     "update_epochs": (1, 10**6),
+    "relabelings": (0, 10**6),
     "clip_coef": (0, 10),
     "ent_coef": (0, 10),
     "vf_coef": (0, 10),
@@ -37,6 +42,9 @@ LIMITS = {
     "reward_scales": (0, 10**6),
     "threshold": (0, 1),
     "preference": (0, 1),
+    "population": (4, MAX_ENVS),
+    "episodes_each": (1, MAX_ENVS),
+    "block_years": (1, 10**6),
 }
 
 
@@ -45,11 +53,31 @@ def fail(message: str):
     sys.exit(f"error: {message}")
 
 
-def require(*packages: str) -> None:
-    """End the script if one of the packages of the extra `train` is not installed."""
+def require(*packages: str, extra: str = "train") -> None:
+    """End the script if one of the packages of an extra is not installed."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
-        fail(f"not installed: {', '.join(missing)}; in the project's folder: pip install -e '.[train]'")
+        fail(f"not installed: {', '.join(missing)}; in the project's folder: pip install -e '.[{extra}]'")
+
+
+def shipped_policies() -> dict[str, Path]:
+    """The policies that ship: name -> file."""
+    return {path.stem: path for path in sorted(SHIPPED.glob("*.pt"))}
+
+
+def policy_file(run_or_name) -> Path:
+    """The file of a policy: of a run's folder, the file itself, or of a name that ships. FileNotFoundError if none."""
+    path, ships = Path(run_or_name), shipped_policies()
+    if path.is_dir():
+        path = path / POLICY
+    elif not path.exists():
+        path = ships.get(str(run_or_name), path)
+    if not path.exists():
+        raise FileNotFoundError(
+            f"{run_or_name}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a policy that "
+            f"ships ({', '.join(ships) or 'none does yet'})"
+        )
+    return path
 
 
 def describe(arguments: type) -> str:
@@ -93,12 +121,31 @@ def message_of(box: str) -> str:
 
 
 def check_limits(args) -> None:
-    """End the script with one line that names an argument outside its limits, and them."""
+    """End the script with one line for an argument outside its limits, or one that does not go with --num-envs."""
     for name, (low, high) in LIMITS.items():
         value = getattr(args, name, None)
         for number in flat(value):
             if not low <= number <= high:
                 fail(f"--{name.replace('_', '-')} must lie in [{low}, {high}], not {number}")
+    if not hasattr(args, "num_envs"):
+        return
+    fill_in_envs(args)
+    if args.num_envs % getattr(args, "group_size", 1):
+        fail(f"--group-size {args.group_size}: a divisor of --num-envs {args.num_envs} is allowed")
+    if getattr(args, "rollout_steps", 0) % args.num_envs:
+        fail(
+            f"--rollout-steps {args.rollout_steps}, a sum over all environments, must be a multiple of "
+            f"--num-envs {args.num_envs}"
+        )
+    steps = getattr(args, "total_timesteps", None)
+    if steps is not None and steps < args.num_envs:
+        fail(f"--total-timesteps {steps} must be at least --num-envs {args.num_envs}")
+
+
+def fill_in_envs(args) -> None:
+    """Set --num-envs, in place, where it is left to the vectorization."""
+    if getattr(args, "num_envs", 0) is None:
+        args.num_envs = 32 if args.vectorization == "lockstep" else 8
 
 
 def flat(value) -> list:

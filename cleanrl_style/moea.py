@@ -1,13 +1,12 @@
 # NSGA-II and MOEA/D, by pymoo, over the weights of a small policy or over plans: a population and no gradient.
 # What a candidate is: `Agent`, `first_candidates`. How it is judged: the loop at the end. The rest is pymoo's.
-import importlib.util
 import random
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from cleanrl_style.flags import parse
+from cleanrl_style.flags import parse, require
 
 
 @dataclass
@@ -61,6 +60,7 @@ class Args:
 
 
 if __name__ == "__main__":
+    require("pymoo", extra="planners")
     args = parse(Args)  # a bad flag is answered before all that follows is loaded
 
 import numpy as np
@@ -206,16 +206,11 @@ def nondominated(genes, gains):
 
 
 if __name__ == "__main__":
-    if importlib.util.find_spec("pymoo") is None:
-        protocol.fail('pymoo is not installed: pip install -e ".[planners]"')
     task = protocol.make_task(args, hide_site=args.hide_site)
     if not task.boreal:
         protocol.fail(f"--env-id {args.env_id}: candidates know the boreal environments alone")
     if args.episodes_each is None:
         args.episodes_each = 1 if task.mode == "site-specific" else 8
-    for name, least in (("population", 4), ("episodes_each", 1), ("block_years", 1)):
-        if getattr(args, name) < least:
-            protocol.fail(f"--{name.replace('_', '-')} {getattr(args, name)}: {least} or more are allowed")
     args.num_envs = args.population * args.episodes_each
     if args.num_envs > protocol.MAX_ENVS:
         protocol.fail(f"--population x --episodes-each {args.num_envs}: {protocol.MAX_ENVS} at most are allowed")

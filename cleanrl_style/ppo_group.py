@@ -269,13 +269,9 @@ if __name__ == "__main__":
         protocol.fail("--scalarization chebyshev: each objective has an advantage of its own here; linear is allowed")
     task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns
-    if args.group_size < 1 or args.num_envs % args.group_size:
-        protocol.fail(f"--group-size {args.group_size}: a divisor of --num-envs {args.num_envs} is allowed")
-    if args.relabelings < 0:
-        protocol.fail(f"--relabelings {args.relabelings}: 0 or more is allowed")
     gae_lambda = args.gae_lambda or [1.0 if name == "thaw" else 0.95 for name in task.objectives]
     if len(gae_lambda) not in (1, task.num_objectives):
-        protocol.fail(f"--gae-lambda: 1 number or {task.num_objectives} are allowed, not {len(gae_lambda)}")
+        protocol.fail(f"--gae-lambda: 1 number or {task.num_objectives} are allowed, not {list(gae_lambda)}")
     update_columns = (
         "iteration",
         "global_step",

@@ -1,15 +1,23 @@
 import shutil
 import zipfile
+from pathlib import Path
 
 import pandas as pd
 import pytest
 from tiny_runs import TINY_RUNS, write_run
 
 from analysis import archive, make_tables, runs
+from cleanrl_style.protocol.reference import physics_name
 
 
 def files_of(folder):
     return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_runs_of_another_physics_are_found():
+    made = {"old": {}, "here": {"physics": physics_name()}, "elsewhere": {"physics": "0123456789abcdef"}}
+    others = runs.of_another_physics([runs.Run(Path(name), config, {}) for name, config in made.items()])
+    assert [str(run.folder) for run in others] == ["elsewhere"]
 
 
 @pytest.fixture

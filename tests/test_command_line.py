@@ -11,8 +11,8 @@ from scripts import ROOT, run_script
 
 import boreal_env
 from analysis import score_policy, ship_policies
-from cleanrl_style import protocol
-from cleanrl_style.protocol import agents, command_line
+from cleanrl_style import flags, protocol
+from cleanrl_style.protocol import command_line
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +30,8 @@ def run(tmp_path_factory):
 @pytest.fixture
 def shipped(run, tmp_path, monkeypatch):
     """That run's policy, shipped."""
-    monkeypatch.setattr(agents, "files", lambda package: tmp_path)
-    ship_policies.main(ship_policies.Args((run,), tmp_path / agents.FOLDER))
+    monkeypatch.setattr(flags, "SHIPPED", tmp_path)
+    ship_policies.main(ship_policies.Args((run,), tmp_path))
     return "ppo_gated-site-specific"
 
 
@@ -43,7 +43,7 @@ def test_the_module_says_what_there_is():
 
 
 def test_a_policy_ships_small_and_is_loaded_by_name(shipped, run, tmp_path):
-    path = tmp_path / agents.FOLDER / f"{shipped}.pt"
+    path = tmp_path / f"{shipped}.pt"
     assert path.stat().st_size <= ship_policies.LARGEST < (run / "policy.pt").stat().st_size + 50_000
     by_name, by_folder, by_file = (protocol.load_policy(name) for name in (shipped, run, run / "policy.pt"))
     observations = np.random.default_rng(0).random((5, 43), dtype=np.float32)
@@ -90,6 +90,10 @@ def test_a_policy_is_watched(shipped, tmp_path, capsys, monkeypatch):
         (["watch", "{run}", "--env-id", "boreal-balanced-v0"], "observes 43 entries, boreal-balanced-v0 has 105"),
         (["watch", "{run}", "--env-id", "boral-v0"], "boral"),
         (["watch", "{run}", "--out", "/nowhere/years.gif"], "--out /nowhere/years.gif: there is no folder /nowhere"),
+        (["watch", "{run}", "--out", "years.mp4"], r"--out years.mp4: a file that ends in .gif is allowed"),
+        (["watch", "{run}", "--site-seed", "-1"], r"--site-seed: an integer in \[0, 2\^63\) is allowed, got -1"),
+        (["watch", "{run}", "--script", "x.md"], "--script x.md: a file that ends in .py, and is there, is allowed"),
+        (["watch", "{run}", "--script", flags.__file__], "flags.py: it has no Agent and no make_policy"),
         (["watch", __file__], "no policy that a script of this project has written"),
         (["wach"], "invalid choice: 'wach'"),
     ],
@@ -114,12 +118,31 @@ def test_a_policy_that_does_not_play_its_evaluation_is_refused(run, tmp_path):
     table.assign(thaw_return=table.thaw_return + 1).to_csv(tmp_path / "evaluation.csv", index=False)
     with pytest.raises(SystemExit, match="does not play what evaluation.csv says"):
         score_policy.main(score_policy.Args(tmp_path, tasks=("boreal-site-specific-v0",), episodes=1))
-    with pytest.raises(SystemExit, match="--add: a row of the leaderboard"):
-        score_policy.main(score_policy.Args(run, episodes=1, add=True))
-    with pytest.raises(SystemExit, match="--episodes 0: 1 to 200 are allowed"):
-        score_policy.main(score_policy.Args(run, episodes=0))
-    with pytest.raises(SystemExit, match="boral"):
-        score_policy.main(score_policy.Args(run, tasks=("boral-v0",), episodes=1))
+
+
+@pytest.mark.parametrize(
+    "given, message",
+    [
+        (("nobody",), "nobody: neither the folder of a finished run"),
+        (("ppo_group", "--episodes", "1", "--add"), "--add: a row of the leaderboard is of both tasks and all 200"),
+        (("ppo_group", "--episodes", "0"), "--episodes 0: 1 to 200 are allowed"),
+        (("ppo_group", "--root", "/nowhere", "--add"), "--root /nowhere: no docs/leaderboard.md with"),
+        (("ppo_group", "--name", "a|b"), r"--name 'a\|b': a cell of a table, without \|, is allowed"),
+        (("ppo_group", "--script", "nowhere.py"), "--script nowhere.py: a file that ends in .py, and is there"),
+        (("ppo_group", "--tasks", "boral-v0"), "--tasks boral-v0: Environment `boral` doesn't exist"),
+    ],
+)
+def test_a_policy_is_scored_with_good_flags_alone(given, message):
+    with pytest.raises(SystemExit, match=f"^error: {message}") as refused:
+        run_script("analysis/score_policy.py", *given)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("command", [("analysis/score_policy.py", "nobody"), ("-m", "boreal_env", "watch", "nobody")])
+def test_a_bad_flag_is_answered_before_torch_is_loaded(command):
+    said = subprocess.run([sys.executable, "-X", "importtime", *command], capture_output=True, text=True, cwd=ROOT)
+    assert said.stderr.splitlines()[-1].startswith("error: nobody: neither")
+    assert "| torch\n" not in said.stderr
 
 
 def test_rows_go_into_the_leaderboard(tmp_path):

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import gymnasium as gym
 import numpy as np
 import pytest
+from scripts import run_script
 
 import boreal_env
 import sim
@@ -122,7 +123,7 @@ def test_a_trained_policy_plays_as_in_the_evaluation(setting, tmp_path):
     from cleanrl_style.protocol.evaluation import play
 
     folder = saved_run(tmp_path / "runs" / "one")
-    assert players.trained_runs(tmp_path) == [folder]
+    assert players.trained_runs(tmp_path) == [*protocol.shipped_policies(), folder]
     task = protocol.Task.of(PAPER, years=3)
     for greedy in (True, False):
         stand = Stand(setting, 0.25)
@@ -275,6 +276,20 @@ def test_the_page_in_a_browser(tmp_path):
         assert problems == []
         hosts = {url.split("/")[2] for url in requests if not url.startswith(("data:", "blob:"))}
         assert hosts == {address.split("/")[2]}  # nothing comes from the internet
+
+
+@pytest.mark.parametrize(
+    "given, message",
+    [
+        (("--runs", "/nowhere"), "--runs /nowhere: no such folder"),
+        (("--port", "0"), "--port 0: 1 to 65535 are allowed"),
+        (("--prot", "5"), "Unrecognized options: --prot"),
+    ],
+)
+def test_a_bad_flag_of_the_page_gets_one_line(given, message):
+    pytest.importorskip("panel", reason=NO_PANEL)
+    with pytest.raises(SystemExit, match=f"^error: {message}"):
+        run_script("analysis/explore.py", *given)
 
 
 def test_a_port_that_is_taken_is_refused(tmp_path):

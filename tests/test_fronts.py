@@ -4,9 +4,9 @@ import pytest
 from scripts import run_script
 
 from analysis import stored
-from analysis.studies import draw_conflict, fronts, nsga2, open_loop
+from analysis.studies import draw_conflict, fronts, genes, nsga2, open_loop
 
-TINY = nsga2.Budget(population=8, generations=2, weathers=1, report_weathers=2)
+TINY = genes.Budget(population=8, generations=2, weathers=1, report_weathers=2)
 
 
 def table_of(plans: dict, kind: str) -> pd.DataFrame:
@@ -36,8 +36,8 @@ def hand_case() -> pd.DataFrame:
 
 
 def test_genes_are_blocks_of_actions():
-    assert nsga2.plans([[4, 0, 2, 2]], block_years=3, years=5).tolist() == [[20, 20, 20, 12, 12]]
-    constant = nsga2.plans(nsga2.constant_genes(3), 1, 3)
+    assert genes.plans([[4, 0, 2, 2]], block_years=3, years=5).tolist() == [[20, 20, 20, 12, 12]]
+    constant = genes.plans(genes.constant_genes(3), 1, 3)
     assert (constant == constant[:, :1]).all()
     assert sorted(constant[:, 0]) == sorted({*range(10), 12, *range(15, 25)})
 
@@ -45,12 +45,12 @@ def test_genes_are_blocks_of_actions():
 def test_search_finds_a_known_front():
     """Blocks of conifers against blocks of deciduous trees planted: only full planting is not dominated."""
 
-    def objectives(genes):
-        pairs = genes.reshape(len(genes), -1, 2)
+    def objectives(searched):
+        pairs = searched.reshape(len(searched), -1, 2)
         planting = pairs[:, :, 0] == 4
         return np.column_stack([(planting & (pairs[:, :, 1] == mix)).sum(axis=1) for mix in (4, 0)])
 
-    budget = nsga2.Budget(population=24, generations=30, weathers=1, report_weathers=1)
+    budget = genes.Budget(population=24, generations=30, weathers=1, report_weathers=1)
     found = objectives(nsga2.search(objectives, 4, budget, seed=1))
     assert {tuple(point) for point in found} == {(k, 4 - k) for k in range(5)}
 
@@ -58,13 +58,13 @@ def test_search_finds_a_known_front():
 def test_equal_plans_have_equal_genes():
     seen = []
 
-    def objectives(genes):
-        seen.append(list(map(tuple, genes)))
-        return np.column_stack([genes.sum(axis=1), -genes[:, 0]])
+    def objectives(searched):
+        seen.append(list(map(tuple, searched)))
+        return np.column_stack([searched.sum(axis=1), -searched[:, 0]])
 
-    nsga2.search(objectives, 2, nsga2.Budget(8, 5, 1, 1), seed=1)
+    nsga2.search(objectives, 2, genes.Budget(8, 5, 1, 1), seed=1)
     assert all(len(set(generation)) == len(generation) for generation in seen)
-    assert all(gene[k + 1] == nsga2.HALF for gene in sum(seen, []) for k in (0, 2) if gene[k] == nsga2.NO_CHANGE)
+    assert all(gene[k + 1] == genes.HALF for gene in sum(seen, []) for k in (0, 2) if gene[k] == genes.NO_CHANGE)
 
 
 def test_front_gains_and_ends_of_a_hand_case():

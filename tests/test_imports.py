@@ -72,6 +72,12 @@ def test_what_is_slow_or_an_extra_is_imported_when_it_is_needed(module):
     assert not {"matplotlib", "mo_gymnasium", "moocore", "scipy.stats", "torch", "tyro"} & set(names.split())
 
 
+@pytest.mark.parametrize("module", ["make_tables", "make_figures", "reproduce", "score_policy"])
+def test_what_the_extra_train_installs_is_enough_for_tables(module):
+    block = "import sys; sys.modules.update(dict.fromkeys(('pymoo', 'panel', 'ray', 'xarray', 'zarr')))"
+    subprocess.run([sys.executable, "-c", f"{block}; import analysis.{module}"], check=True, cwd=ROOT)
+
+
 def test_a_picture_without_its_library_is_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(DependencyNotInstalled, match='^render_mode "rgb_array": pip install matplotlib$'):

@@ -130,7 +130,7 @@ def test_the_policy_of_a_run_is_played(tmp_path):
 
 def test_a_folder_without_a_policy_is_refused(tmp_path):
     with pytest.raises(SystemExit, match="--policy .*: neither the folder of a finished run"):
-        draw_readme.main(policy=str(tmp_path))
+        draw_readme.main(draw_readme.Args(policy=str(tmp_path)))
 
 
 def timber(year):

@@ -463,6 +463,10 @@ def test_learns_the_toy(tmp_path):
         (["--thaw-formulation", "contrast", "--env-id", "toy_env:toy-v0"], "not for --env-id toy_env:toy-v0"),
         (["--vectorization", "lockstep", "--env-id", "toy_env:toy-v0"], "no vector entry point"),
         (["--reward-scales", "1", "-1"], "--reward-scales must lie in [0, 1000000], not -1"),
+        (
+            ["--reward-scales", "1", "1", "1"],
+            "--reward-scales: 2 numbers, of carbon, thaw, are allowed, not [1.0, 1.0, 1.0]",
+        ),
         (["--hide-site", "--mode", "site-specific"], "--env-id boreal-site-specific-v0 observes no site parameters"),
         (["--hide-site", "--env-id", "toy_env:toy-v0"], "--env-id toy_env:toy-v0 observes no site parameters"),
         (["--hide-site"], "--hide-site leaves --selector network nothing to score"),

@@ -13,9 +13,9 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
 from PIL import Image
 
 from cleanrl_style import protocol
@@ -33,6 +33,20 @@ COLOURS = 255
 def program() -> str | None:
     """The browser that is installed; None without one."""
     return next(filter(None, map(shutil.which, PROGRAMS)), None)
+
+
+@dataclass
+class Args:
+    """Draws the page after some years."""
+
+    path: Path = Path("docs/images/explore.png")
+    """file of the picture"""
+    width: int = 1280
+    """of the browser's window [pixels]"""
+    height: int = 1130
+    """of the browser's window [pixels]"""
+    years: int = 30
+    """played before, in tens"""
 
 
 @contextlib.contextmanager
@@ -64,26 +78,19 @@ def opened(address: str, width: int, height: int):
         browser.close()
 
 
-def main(path: Path = Path("docs/images/explore.png"), width: int = 1280, height: int = 1130, years: int = 30) -> None:
-    """Draw the page after some years.
-
-    Args:
-        path: file of the picture
-        width: of the browser's window [pixels]
-        height: of the browser's window [pixels]
-        years: played before, in tens
-    """
+def main(args: Args) -> None:
+    """Draw it."""
     if program() is None:
         protocol.fail(f"no browser: one of {', '.join(PROGRAMS)} has to be installed")
-    with served(Path.cwd()) as address, opened(address, width, height) as tab:
-        for decade in range(10, years + 1, 10):
+    with served(Path.cwd()) as address, opened(address, args.width, args.height) as tab:
+        for decade in range(10, args.years + 1, 10):
             tab.get_by_role("button", name="Ten years").click()
             tab.get_by_text(f"Through year {decade},").wait_for()  # what is filled last
         tab.wait_for_timeout(2000)  # charts are drawn after texts
         shot = Image.open(io.BytesIO(tab.screenshot()))
-    with protocol.replacing(path) as file:
+    with protocol.replacing(args.path) as file:
         shot.convert("RGB").quantize(COLOURS).save(file, format="png", optimize=True)
 
 
 if __name__ == "__main__":
-    tyro.cli(main)
+    main(protocol.parse(Args))

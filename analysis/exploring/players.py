@@ -55,8 +55,8 @@ def drawn(probabilities: np.ndarray, stand: Stand) -> int:
 
 
 def trained_runs(folder: Path) -> list[str]:
-    """Runs in a folder that have left a policy."""
-    return sorted(str(policy.parent) for policy in folder.rglob("policy.pt"))
+    """Runs in a folder that have left a policy, after those that ship."""
+    return [*protocol.shipped_policies(), *sorted(str(policy.parent) for policy in folder.rglob("policy.pt"))]
 
 
 def trained(folder: str, stand: Stand, greedy: bool) -> Player:

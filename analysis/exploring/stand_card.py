@@ -152,16 +152,17 @@ def signed(number: float) -> str:
 
 
 def events(view: View) -> str:
-    """What happened in the last year."""
+    """The trees, and what happened to them in the year looked at."""
     density = view.stems.sum()
     conifers = f"{100 * view.stems[0].sum() / density:.0f} % conifers" if density > 0.0 else "no trees"
-    said = [f"{density:.0f} stems/ha", conifers]
     stems = {"planted": "planted", "cut": "thinned", "came by themselves": "recruited", "died": "dead"}
-    said += [
+    moved = [
         f"{what} {view.last(f'{k}_stems_ha'):.0f}" for what, k in stems.items() if view.last(f"{k}_stems_ha") >= 0.5
     ]
+    said = [f"{', '.join(moved)} stems/ha"] if moved else []
     killed = {name: 100 * view.last(f"{name}_mortality") for name in ("fire", "insect")}
     said += [f"{name}{'s' * (name == 'insect')} killed {share:.0f} %" for name, share in killed.items() if share > 0.0]
     penalty = sum(view.last(name) for name in PENALTIES)
     said += [f"penalty {signed(-penalty)} carbon"] * (penalty > 0.0)
-    return f"<p>{' · '.join(said)}</p>"
+    year = f"<p>This year: {' · '.join(said)}</p>" if said else ""
+    return f"<p>{density:.0f} stems/ha · {conifers}</p>{year}"

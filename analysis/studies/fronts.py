@@ -18,10 +18,12 @@ import pandas as pd
 import sim
 from analysis import paths, stored
 from analysis.metrics import hypervolume
-from analysis.studies import nsga2, open_loop
-from analysis.studies.nsga2 import Budget
+from analysis.studies import genes as plan_genes
+from analysis.studies import open_loop
+from analysis.studies.genes import Budget
 from analysis.studies.open_loop import GAINS, RETURNS, with_gains
 from cleanrl_style import protocol
+from cleanrl_style.flags import require
 
 YEARS = 50
 BLOCK_YEARS = 5
@@ -64,11 +66,13 @@ def study(site_seed: int, budget: Budget, seed: int, years: int, mechanisms=None
     mechanisms : switches, see `sim.Stands`; played : called with the number of episodes just played, if given.
     Columns: kind (front, what the search found, or constant), actions (one a block), weather, RETURNS, STAND.
     """
+    from analysis.studies.nsga2 import search
+
     site = sim.sample_site(site_seed)
     blocks = -(-years // BLOCK_YEARS)
 
     def play(genes, weathers):
-        plans = nsga2.plans(genes, BLOCK_YEARS, years).repeat(len(weathers), axis=0)
+        plans = plan_genes.plans(genes, BLOCK_YEARS, years).repeat(len(weathers), axis=0)
         seeds = [open_loop.seeds(site_seed, weather) for weather in weathers] * len(genes)
         episodes = open_loop.play([site] * len(plans), seeds, plans, mechanisms=mechanisms)
         if played:
@@ -78,12 +82,12 @@ def study(site_seed: int, budget: Budget, seed: int, years: int, mechanisms=None
     def mean_returns(genes):
         return play(genes, range(budget.weathers)).returns().reshape(len(genes), budget.weathers, 2).mean(axis=1)
 
-    found = nsga2.search(mean_returns, blocks, budget, seed)
-    constant = nsga2.constant_genes(blocks)
+    found = search(mean_returns, blocks, budget, seed)
+    constant = plan_genes.constant_genes(blocks)
     genes = np.concatenate([found, constant])
     weathers = range(budget.weathers, budget.weathers + budget.report_weathers)
     episodes = play(genes, weathers)
-    names = [" ".join(map(str, plan)) for plan in nsga2.plans(genes, 1, blocks)]
+    names = [" ".join(map(str, plan)) for plan in plan_genes.plans(genes, 1, blocks)]
     table = pd.DataFrame(
         {
             "kind": np.repeat(["front"] * len(found) + ["constant"] * len(constant), len(weathers)),
@@ -185,14 +189,15 @@ def describe(site_seed: int) -> dict:
 
 def most_episodes(budget: Budget) -> int:
     """Episodes of one front; fewer if the last generation has dominated plans."""
-    first = len(nsga2.first_genes(-(-YEARS // BLOCK_YEARS), budget.population, np.random.default_rng(0)))
+    first = len(plan_genes.first_genes(-(-YEARS // BLOCK_YEARS), budget.population, np.random.default_rng(0)))
     searched = first + budget.population * (budget.generations - 1)
-    reported = budget.population + len(nsga2.constant_genes(1))
+    reported = budget.population + len(plan_genes.constant_genes(1))
     return searched * budget.weathers + reported * budget.report_weathers
 
 
 def main(args: Args) -> None:
     """Search every case that is not finished, write the summary, print it."""
+    require("pymoo", extra="analysis")
     most = 3 if args.without_mechanisms else open_loop.CANDIDATES
     if args.sites is not None and not 1 <= args.sites <= most:
         sys.exit(f"fronts.py: --sites {args.sites}: 1 to {most} are allowed")

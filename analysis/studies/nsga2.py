@@ -1,11 +1,7 @@
-"""NSGA-II (Deb et al. 2002, by pymoo) over plans: a density change and a conifer mix for every block of years.
-
-Two genes a block, each an index 0 to 4 on an ordered scale, and not the action's number, whose neighbours may be
-opposite actions (4 cuts 100 stems, 5 cuts 50). Crossover exchanges a stretch of years; mutation draws genes anew.
-"""
+"""NSGA-II (Deb et al. 2002, by pymoo) over plans (genes.py): crossover exchanges a stretch of years, mutation draws
+genes anew."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from pymoo.algorithms.moo.nsga2 import NSGA2
@@ -15,47 +11,7 @@ from pymoo.core.repair import Repair
 from pymoo.operators.crossover.pntx import TwoPointCrossover
 from pymoo.optimize import minimize
 
-LEVELS = 5
-NO_CHANGE = 2  # density index
-HALF = 2  # mix index
-
-
-class Budget(NamedTuple):
-    """How long is searched, and on how many weathers."""
-
-    population: int
-    generations: int
-    weathers: int  # the search plays each plan on
-    report_weathers: int  # others, that the plans found are reported on
-
-
-def plans(genes: np.ndarray, block_years: int, years: int) -> np.ndarray:
-    """Actions (n, years) of genes (n, 2 x blocks): density index and mix index of each block in turn."""
-    pairs = np.asarray(genes).reshape(len(genes), -1, 2)
-    return np.repeat(LEVELS * pairs[:, :, 0] + pairs[:, :, 1], block_years, axis=1)[:, :years]
-
-
-def constant_genes(blocks: int) -> np.ndarray:
-    """The constant plans: no change, and every density change with every mix, (21, 2 x blocks)."""
-    pairs = [(density, mix) for density in range(LEVELS) for mix in range(LEVELS) if density != NO_CHANGE]
-    return np.tile([(NO_CHANGE, HALF), *pairs], blocks)
-
-
-def first_genes(blocks: int, number: int, generator: np.random.Generator) -> np.ndarray:
-    """Plans to start from, (number or more, 2 x blocks): constant ones, a forester's, the rest at random.
-
-    A forester's: plant the whole first fifth or two and then let grow, at every mix; conifers first and deciduous
-    trees later, and the reverse.
-    """
-    forester = []
-    for share in (0.2, 0.4):
-        planting = max(1, round(share * blocks))
-        forester += [[(4, mix)] * planting + [(NO_CHANGE, HALF)] * (blocks - planting) for mix in range(LEVELS)]
-    half = blocks // 2
-    forester += [[(4, a)] * half + [(4, b)] * (blocks - half) for a, b in ((4, 0), (0, 4))]
-    genes = np.concatenate([constant_genes(blocks), np.reshape(forester, (len(forester), -1))])
-    random = generator.integers(LEVELS, size=(max(number - len(genes), 0), 2 * blocks))
-    return np.concatenate([genes, random])
+from analysis.studies.genes import HALF, LEVELS, NO_CHANGE, Budget, first_genes
 
 
 def search(objectives: Callable, blocks: int, budget: Budget, seed: int) -> np.ndarray:

@@ -6,8 +6,8 @@ it is (`make_task`), opens its folder (`Run`), trains on `run.make_envs()`, logs
 `load_policy` gives a finished run's policy, or one that ships.
 """
 
-from cleanrl_style.flags import FIRST_EVALUATION_SEED, LIMITS, MAX_ENVS, fail, parse
-from cleanrl_style.protocol.agents import Policy, load_policy, shipped_policies
+from cleanrl_style.flags import FIRST_EVALUATION_SEED, LIMITS, MAX_ENVS, fail, parse, shipped_policies
+from cleanrl_style.protocol.agents import Policy, load_policy
 from cleanrl_style.protocol.arguments import make_task, not_default
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.evaluation import POLICIES, evaluate

@@ -6,18 +6,16 @@ import json
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 from gymnasium.spaces import Box
 
+from cleanrl_style.flags import policy_file
 from cleanrl_style.protocol.arguments import make_task
 from cleanrl_style.protocol.evaluation import choose_actions
 from cleanrl_style.protocol.task import Task
-
-FOLDER, FILE = "policies", "policy.pt"  # of those that ship; in a run's folder
 
 
 @dataclass(frozen=True)
@@ -69,12 +67,6 @@ class Policy:
         return make_task(arguments, hide_site=self.arguments.get("hide_site", False))
 
 
-def shipped_policies() -> dict[str, Path]:
-    """The policies that ship: name -> file."""
-    folder = Path(str(files("cleanrl_style"))) / FOLDER
-    return {path.stem: path for path in sorted(folder.glob("*.pt"))}
-
-
 def load_policy(run_or_name, script=None) -> Policy:
     """A trained policy.
 
@@ -82,18 +74,9 @@ def load_policy(run_or_name, script=None) -> Policy:
     the script that trained it, if that does not lie in cleanrl_style/. Raises FileNotFoundError if there is no such
     policy, or not the script, and ValueError if the script's network is another one by now.
     """
+    path = policy_file(run_or_name)
     import torch
 
-    path, ships = Path(run_or_name), shipped_policies()
-    if path.is_dir():
-        path = path / FILE
-    elif not path.exists():
-        path = ships.get(str(run_or_name), path)
-    if not path.exists():
-        raise FileNotFoundError(
-            f"{run_or_name}: neither the folder of a finished run, with {FILE}, nor such a file, nor a policy that "
-            f"ships ({', '.join(ships) or 'none does yet'})"
-        )
     try:
         saved = torch.load(path, weights_only=True)
         run = saved.get("run") or json.loads((path.parent / "config.json").read_text(encoding="utf-8"))
@@ -104,6 +87,9 @@ def load_policy(run_or_name, script=None) -> Policy:
         raise FileNotFoundError(f"{path}: config.json of its run has to lie beside it") from error
     module = _script_module(run["script"], script)
     space = Box(-np.inf, np.inf, tuple(saved["observation_shape"]), np.float32)
+    lacking = [part for part in ("Agent", "make_policy") if not hasattr(module, part)]
+    if lacking:
+        raise ValueError(f"{module.__file__}: it has no {' and no '.join(lacking)}, so it trained no policy")
     agent = module.Agent(SimpleNamespace(single_observation_space=space), **saved["arguments"])
     try:
         # a policy that ships is without its critic, which chooses nothing
@@ -127,7 +113,9 @@ def _script_module(name: str, path) -> ModuleType:
     """The script as a module."""
     if path is None:
         if importlib.util.find_spec(f"cleanrl_style.{name}") is None:
-            raise FileNotFoundError(f"no cleanrl_style/{name}.py; load_policy(run_folder, script=path) names another")
+            raise FileNotFoundError(
+                f"no cleanrl_style/{name}.py; script=path, on a command line --script, names another"
+            )
         return importlib.import_module(f"cleanrl_style.{name}")
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or not Path(path).exists():

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 import boreal_env
-from cleanrl_style.flags import check_limits, fail
+from cleanrl_style.flags import check_limits, fail, fill_in_envs
 from cleanrl_style.protocol.fronts import evaluation_weights, return_columns
 from cleanrl_style.protocol.reference import reference_returns
 from cleanrl_style.protocol.sites import evaluation_seeds, published_seeds
@@ -62,13 +62,6 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
         evaluation_seeds(task, args.eval_episodes)
     if not weights or len(set(weights)) < len(weights):
         fail("--eval-weights must name at least one weight, and none twice")
-    if hasattr(args, "rollout_steps") and args.rollout_steps % args.num_envs:
-        fail(
-            f"--rollout-steps {args.rollout_steps}, a sum over all environments, must be a multiple of "
-            f"--num-envs {args.num_envs}"
-        )
-    if hasattr(args, "total_timesteps") and args.total_timesteps < args.num_envs:
-        fail(f"--total-timesteps {args.total_timesteps} must be at least --num-envs {args.num_envs}")
     for package in getattr(args, "track", ()):
         if importlib.util.find_spec(package) is None:
             fail(f"--track {package}: the package is not installed (pip install {package})")
@@ -111,18 +104,18 @@ def name_environment(args) -> str:
     return env_id
 
 
-def ask(env_id: str, **env_kwargs) -> Task:
+def ask(env_id: str, flag: str = "--env-id", **env_kwargs) -> Task:
     """The environment's answers; exits with one line if there is none, or one that the scripts cannot handle."""
     ours = ", ".join(name for name in gym.registry if name.startswith("boreal-"))
     allowed = f"allowed: {ours}, or module:id of an environment of yours"
     if env_id.count(":") > 1 or not all(env_id.split(":")):
-        fail(f"--env-id {env_id!r}; {allowed}")
+        fail(f"{flag} {env_id!r}; {allowed}")
     try:
         return Task.of(env_id, **env_kwargs)
     except (gym.error.Error, ModuleNotFoundError) as error:
-        fail(f"--env-id {env_id}: {str(error).splitlines()[0]}; {allowed}")
+        fail(f"{flag} {env_id}: {str(error).splitlines()[0]}; {allowed}")
     except ValueError as error:
-        fail(f"--env-id {env_id}: {error}")
+        fail(f"{flag} {env_id}: {error}")
 
 
 def fill_in(args, registered: Task) -> None:
@@ -133,11 +126,13 @@ def fill_in(args, registered: Task) -> None:
         args.thaw_formulation = registered.thaw_formulation
     if getattr(args, "total_timesteps", 0) is None:
         args.total_timesteps = DEFAULT_STEPS[args.mode]
-    if getattr(args, "num_envs", 0) is None:
-        args.num_envs = 32 if args.vectorization == "lockstep" else 8
+    fill_in_envs(args)
     number = registered.num_objectives
     if getattr(args, "reward_scales", ()) is None:
         args.reward_scales = (1.0,) * number
+    if len(getattr(args, "reward_scales", range(number))) != number:
+        names = ", ".join(registered.objectives)
+        fail(f"--reward-scales: {number} numbers, of {names}, are allowed, not {list(args.reward_scales)}")
     if getattr(args, "eval_weights", ()) is None:
         args.eval_weights = evaluation_weights(number)
     elif number != 2 and hasattr(args, "eval_weights") and np.ndim(args.eval_weights) == 1:

@@ -12,9 +12,9 @@ import gymnasium as gym
 import numpy as np
 
 import boreal_env
-from cleanrl_style.flags import prepare_output, require
-from cleanrl_style.protocol.agents import Policy, load_policy, shipped_policies
-from cleanrl_style.protocol.arguments import fail
+from cleanrl_style.flags import fail, policy_file, prepare_output, require, shipped_policies
+from cleanrl_style.protocol.agents import Policy, load_policy
+from cleanrl_style.protocol.arguments import ask
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.files import replacing
 from cleanrl_style.protocol.task import as_option
@@ -65,6 +65,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     commands = parser.add_subparsers(dest="command", metavar="watch")
     watch = commands.add_parser("watch", help="fifty years of a trained policy, as an animated GIF or in a window")
     watch.add_argument("policy", help="folder of a run, policy file, or name of a policy that ships")
+    watch.add_argument("--script", type=Path, help="the script that trained it, if not of cleanrl_style/")
     watch.add_argument("--preference", type=float, nargs="+", help="carbon weight, or one weight an objective")
     watch.add_argument("--site-seed", type=int, help="the site, as sim.sample_site(seed) draws it (the seed's own)")
     watch.add_argument("--seed", type=int, default=0, help="of weather, first stand and dice (0)")
@@ -75,9 +76,33 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
+def check(args: argparse.Namespace) -> None:
+    """End the command with one line for what is wrong with its flags, before torch is loaded for the policy."""
+    policy_file(args.policy)
+    if args.script is not None and not (args.script.is_file() and args.script.suffix == ".py"):
+        raise ValueError(f"--script {args.script}: a file that ends in .py, and is there, is allowed")
+    check_seed("--seed", args.seed)
+    if args.site_seed is not None:
+        check_seed("--site-seed", args.site_seed)
+    if args.env_id is not None:
+        check_preference(args.preference, len(ask(args.env_id).objectives))
+    elif args.preference:
+        check_preference(args.preference, max(2, len(args.preference)))
+    if args.out is not None and not args.out.absolute().parent.is_dir():
+        raise ValueError(f"--out {args.out}: there is no folder {args.out.parent}")
+    if args.out is not None and args.out.suffix.lower() != ".gif":
+        raise ValueError(f"--out {args.out}: a file that ends in .gif is allowed")
+
+
+def check_preference(given: list[float] | None, objectives: int) -> np.ndarray:
+    """Weights (m,) of --preference; without it all are equal."""
+    given = given or [1 / objectives] * objectives
+    return check_weights(given[0] if len(given) == 1 else given, objectives, "--preference")
+
+
 def make_env(policy: Policy, env_id: str | None, site_seed: int | None) -> gym.Env:
     """The environment to watch a policy in: that of its training, or another with the same observation."""
-    kwargs = {} if site_seed is None else {"site_seed": check_seed("--site-seed", site_seed)}
+    kwargs = {} if site_seed is None else {"site_seed": site_seed}
     if env_id is None:
         env = policy.task().make(render_mode="rgb_array", **kwargs)
     else:
@@ -137,14 +162,11 @@ def show(frames: list[np.ndarray]) -> None:
 
 def watch(args: argparse.Namespace) -> None:
     """Play the policy, say what it returned beside doing nothing, and show its years."""
-    seed = check_seed("--seed", args.seed)
-    if args.out is not None and not args.out.absolute().parent.is_dir():
-        raise ValueError(f"--out {args.out}: there is no folder {args.out.parent}")
-    policy = load_policy(args.policy)
+    check(args)
+    seed, policy = args.seed, load_policy(args.policy, args.script)
     env = make_env(policy, args.env_id, args.site_seed)
     names = env.unwrapped.objective_names
-    given = args.preference or [1 / len(names)] * len(names)
-    weights = check_weights(given[0] if len(given) == 1 else given, len(names), "--preference")
+    weights = check_preference(args.preference, len(names))
     generator = np.random.default_rng([args.seed, 1]) if args.sampled else None
     compile_physics([1])
     frames, returns = play(env, lambda *given: policy.act(*given, generator=generator), seed, weights)

@@ -57,6 +57,11 @@ def fingerprint(task: Task) -> str:
     return hashlib.sha256(repr(of_all).encode()).hexdigest()[:16]
 
 
+def physics_name() -> str:
+    """Name of this checkout's simulator and environment, that a run's config.json has."""
+    return source()[:16]
+
+
 @functools.cache
 def source() -> str:
     """Hash of source and tables of simulator and environment, but for `NO_PHYSICS`."""

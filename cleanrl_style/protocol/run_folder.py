@@ -28,7 +28,7 @@ from cleanrl_style.protocol.course import Course
 from cleanrl_style.protocol.evaluation import PRIMARY, episodes_by_policy, lanes_of_evaluation
 from cleanrl_style.protocol.files import replacing
 from cleanrl_style.protocol.progress import Progress
-from cleanrl_style.protocol.reference import reference_returns
+from cleanrl_style.protocol.reference import physics_name, reference_returns
 from cleanrl_style.protocol.score import Comparison
 from cleanrl_style.protocol.summary import draw_summary, print_course, print_score, print_table
 from cleanrl_style.protocol.task import Task
@@ -108,6 +108,7 @@ class Run:
             **({"ideal_point": task.utility.ideal} if task.utility.ideal else {}),
             "versions": versions(),
             "commit": commit(),
+            "physics": physics_name(),
         }
         self.envs, self.checkpoint, self.checkpoint_step = None, None, 0
         self.env_seconds, self.shown, self.course = 0.0, None, None
