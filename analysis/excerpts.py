@@ -91,29 +91,28 @@ def scaling() -> str:
         rows.append(cells)
     text = markdown(header, rows)
     region = table[table.what.str.contains("stands, ")]
-    costs = {
-        backend: ", ".join(
-            f"{row.median_:,.3g} {row.unit} ({row.low:,.3g} to {row.high:,.3g})"
-            for row in group.rename(columns={"median": "median_"}).itertuples()
-        )
-        for backend, group in region.groupby("backend", sort=False)
-    }
+    costs = {}
+    for backend, group in region.groupby("backend", sort=False):
+        hours, dollars = (row for _, row in group.iterrows())
+        shown = (f"{row['median']:,.3g} {row.unit} ({row.low:,.3g} to {row.high:,.3g})" for row in (hours, dollars))
+        price = dollars["median"] / hours["median"]
+        costs[backend] = f"{', '.join(shown)}, at {price:.4g} dollars a {hours.unit.replace('-hours', '-hour')}"
     what = region.what.iloc[0].replace("1000000 stands,", "A million stands for")
     lines = (f"- {what}, {'on GPUs' if name == 'cuda' else 'on cores'}: {cost}." for name, cost in costs.items())
     return text + "\n" + "\n".join(lines) + f"\n\nMeasured on {table.machine.iloc[0]}.\n"
 
 
 def region_killed() -> str:
-    """What came of a region that was killed; results/region_killed.csv has it."""
+    """What came of a region that was killed; results/region_killed.csv has it (analysis/region_killed.py)."""
     path = paths.results() / "region_killed.csv"
     if not path.exists():
         return "Not measured yet.\n"
     row = pd.read_csv(path).iloc[0]
     outcome = "the same bytes as" if row.same_bytes else "OTHER BYTES THAN"
     return (
-        f"Measured: {row.stands:,} stands under a trained policy for {row.years} years, in steps of {row.step_minutes} "
-        f"minutes, killed {row.kills} times and gone on with, gave {outcome} a run that was left alone, in at most "
-        f"{row.peak_mb} MB of memory.\n"
+        f"`python analysis/region_killed.py`: {row.stands:,} stands under `{row.policy}` for {row.years} years, in "
+        f"steps of {row.step_minutes} minutes, killed {row.kills} times at random moments and gone on with, gave "
+        f"{outcome} a run that was left alone, in at most {row.peak_mb} MB of memory.\n"
     )
 
 

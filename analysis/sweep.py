@@ -26,7 +26,7 @@ from analysis.tables.common import over_seeds, readable
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 from sim.block import LANES, lanes_for
-from sim.executor import HERE, RAY_HERE, check_address, default_address
+from sim.executor import HERE, RAY_HERE, NoCluster, check_address, default_address
 
 OURS = ("seed", "run_dir", "overwrite")  # arguments of a script that are no setting
 
@@ -189,7 +189,7 @@ def main(args: Args) -> None:
         return
     try:
         check_address(args.address)
-    except ValueError as error:
+    except NoCluster as error:
         protocol.fail(f"--{error}")
     waiting = [run for run in mine if not run.finished]
     where = {HERE: "processes of this machine", RAY_HERE: "Ray on this machine"}.get(
@@ -205,6 +205,8 @@ def main(args: Args) -> None:
             failed = commands.run_all(words, len(mine), address=args.address, workers=args.workers)
         except KeyboardInterrupt:
             sys.exit("\nstopped; the same command goes on from here")
+        except NoCluster as error:
+            protocol.fail(f"--{error}")
         if failed:
             sys.exit("failed, try the same command again:\n" + "\n".join(f"  {one}" for one in failed))
     unfinished = sum(not run.finished for run in found)

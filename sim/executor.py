@@ -13,6 +13,10 @@ RETRIES = 20  # of a task whose worker or node was killed
 OBJECT_STORE_BYTES = 200_000_000  # of a Ray of our own: results are a few megabytes each
 
 
+class NoCluster(ValueError):
+    """Ray is wanted, and is not installed, does not start, or does not answer."""
+
+
 def default_address() -> str:
     """Ray on this machine where Ray is installed, threads where it is not."""
     return RAY_HERE if find_spec("ray") else HERE
@@ -21,7 +25,7 @@ def default_address() -> str:
 def check_address(address: str) -> None:
     """Refuse, in one line, what needs Ray where Ray is not installed."""
     if address != HERE and find_spec("ray") is None:
-        raise ValueError(f'address {address}: it needs Ray, pip install -e ".[ray]"; without it {HERE} is allowed')
+        raise NoCluster(f'address {address}: it needs Ray, pip install -e ".[ray]"; without it {HERE} is allowed')
 
 
 def each(
@@ -34,7 +38,7 @@ def each(
     "auto" or as `ray.init` takes it. With Ray, `work` and the tasks are pickled, and a task whose worker or node is
     killed is done again.
 
-    Raises what `work` raises, and ValueError where Ray is wanted and is not installed.
+    Raises what `work` raises, and `NoCluster`.
     """
     check_address(address)
     workers = available_cores() if workers is None else workers
@@ -97,7 +101,9 @@ class Cluster:
             try:
                 ray.init(address, log_to_driver=False, logging_level="ERROR", **(here if address == RAY_HERE else {}))
             except ConnectionError as error:
-                raise ValueError(f"address {address!r}: no Ray cluster answers there ({error})") from error
+                raise NoCluster(f"address {address!r}: no Ray cluster answers there ({error})") from error
+            except Exception as error:  # Ray's own kind where a busy machine does not start it in half a minute
+                raise NoCluster(f"address {address!r}: Ray does not start ({error})") from error
 
     def width(self) -> int:
         """Twice as many as there are CPUs now, so that none waits for the next task."""

@@ -11,7 +11,8 @@ from sim import stands
 SLOW = """agents archive backends benchmark claims command_line course cuda docs document_results eupg fronts
 heuristics hosts make_figures make_tables measure_balance mechanisms new_method outside picture ppo_curriculum
 ppo_gated ppo_group protocol resume scaling sensitivity signal_to_noise soil_column stand_development stress
-three_objectives training_gains utility validate variance warming boreal_map best_plans executor moea explore sweep"""
+three_objectives training_gains utility validate variance warming boreal_map best_plans executor moea explore sweep
+region_killed"""
 
 
 def pytest_collection_modifyitems(items):

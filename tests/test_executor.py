@@ -77,56 +77,51 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_sweep_whose_workers_and_node_are_killed_has_the_same_bytes(tmp_path, monkeypatch):
-    """Two nodes of a CPU each: a script, a worker and a node are killed at random moments."""
+    """Two nodes of a CPU each: a script, a worker and the node of a script are killed at random moments."""
     pytest.importorskip("ray")
     from ray.cluster_utils import Cluster
 
     monkeypatch.setenv(
         "PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")])
     )
-    monkeypatch.setenv("TOY_SECONDS", "0.002")
-    grid = ("env_id=resumable_toy:resumable-toy-v0", "total_timesteps=3000", "num_envs=2", "rollout_steps=200")
-    grid += ("eval_episodes=2", "eval_weights=0 1")
+    monkeypatch.setenv("RAY_worker_niceness", "0")  # 15 by itself: beside anything else it would take minutes
+    monkeypatch.setenv("TOY_SECONDS", "0.02")  # long enough to be killed, at no cost to the processor
+    grid = ("env_id=resumable_toy:resumable-toy-v0", "total_timesteps=600", "num_envs=2", "rollout_steps=100")
+    grid += ("eval_episodes=1", "eval_weights=0 1")
 
     def args(name, **changes):
         folder = tmp_path / name
-        return sweep.Args(
-            ROOT / "cleanrl_style" / "ppo_gated.py",
-            "1-3",
-            grid,
-            runs_dir=folder,
-            output=folder / "sweep.csv",
-            **changes,
-        )
+        script = ROOT / "cleanrl_style" / "ppo_gated.py"
+        return sweep.Args(script, "1-2", grid, runs_dir=folder, output=folder / "sweep.csv", **changes)
 
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "object_store_memory": 80_000_000})
     nodes = [cluster.add_node(num_cpus=1, object_store_memory=80_000_000) for _ in range(2)]
-    dice, killed = random.SystemRandom(), []
+    dice, killed, ended = random.SystemRandom(), [], threading.Event()
 
-    def kill(wanted):
-        for _ in range(600):
-            scripts = processes(f"{tmp_path}/disturbed")
-            if scripts:
-                break
-            time.sleep(0.1)
-        time.sleep(dice.uniform(0.0, 6.0))
-        for script in processes(f"{tmp_path}/disturbed")[:1]:
-            os.kill(script if wanted == "script" else parent(script), signal.SIGKILL)
-            killed.append(wanted)
+    def kill(what, script):
+        if what == "node":
+            raylet = parent(parent(script))
+            found = [node for node in nodes if node.all_processes["raylet"][0].process.pid == raylet]
+            cluster.remove_node(*found, allow_graceful=False)
+        else:
+            os.kill(script if what == "script" else parent(script), signal.SIGKILL)
+        killed.append(what)
 
     def disturb():
-        kill("script")
-        kill("worker")
-        cluster.remove_node(nodes[0], allow_graceful=False)
-        killed.append("node")
+        for what in ("script", "worker", "node"):
+            while what not in killed and not ended.wait(dice.uniform(0.0, 5.0)):
+                for script in processes(f"{tmp_path}/disturbed")[:1]:
+                    kill(what, script)
 
     disturber = threading.Thread(target=disturb)
     try:
         disturber.start()
         sweep.main(args("disturbed", address=cluster.address))
+        ended.set()
         disturber.join()
-        assert set(killed) == {"script", "worker", "node"}
+        assert killed == ["script", "worker", "node"]
     finally:
+        ended.set()
         cluster.shutdown()
     sweep.main(args("whole", address=executor.HERE))
     assert bytes_of(tmp_path / "disturbed") == bytes_of(tmp_path / "whole")

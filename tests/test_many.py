@@ -97,6 +97,8 @@ def test_a_policy_that_ships_is_taken_as_it_is_loaded():
     policy = load_policy("ppo_group-balanced")
     found = sim.simulate_many(table(2), policy, years=2, others="sampled", **boreal_env.BALANCED_WORLD, **COARSE)
     assert (found.planted_stems_ha > 0).any()
+    with pytest.warns(UserWarning, match="was trained with weather='observed', boundary='balanced', soil_carbon='bal"):
+        sim.simulate_many(table(2), policy, years=1, **COARSE)
     with pytest.raises(ValueError, match="'ppo_group-balanced' is of another world: it observes 105 entries, here are"):
         sim.simulate_many(table(2), policy, years=2, observation_groups=("state",), **COARSE)
 
@@ -195,6 +197,10 @@ def test_chunks_are_of_one_size_and_bounded():
             {"density_stems_ha": [-1.0, 0.0]},
             "zero-based row 0, column density_stems_ha is -1.0; a number in [0, 10000]",
         ),
+        (
+            {"wind_speed_m_s": pd.array([3.0, None], dtype="Float64")},
+            "zero-based row 1, column wind_speed_m_s is missing",
+        ),
         ({"seed": [1, 1.5]}, "zero-based row 1, column seed is 1.5; an integer"),
         (
             {"deep_boundary_temperature_k": [270.0, 271.0]},
@@ -240,6 +246,7 @@ def test_rows_are_named_as_the_table_names_them():
         (table(2), {"others": "random"}, "others 'random': allowed are middle, sampled"),
         (table(2), {"mode": "generalist"}, "unknown argument 'mode'; allowed: time_step_minutes"),
         (table(2), {"years": 0}, "years"),
+        (table(2), {"threads": 0}, "threads: a positive integer is allowed, got 0"),
         (table(2), {"preference": 2.0}, "preference"),
         (table(2), {"seed": -1}, "seed"),
     ],
@@ -301,6 +308,10 @@ def test_gridded_climate(tmp_path):
             xarray.Dataset({"relative_humidity": ("lat", [0.7])}, coords={"lat": [60.0]}),
             "no coordinate longitude or lon",
         ),
+        (climate().assign_coords(lat=[65.0, 60.0, 60.0]), "coordinate lat has 60 twice"),
+        (climate().assign_coords(lat=[65.0, 60.0, np.nan]), "coordinate lat has a value that is missing"),
+        (climate(relative_humidity=(("lat", "lon"), np.full((3, 3), "damp"))), "has type <U4; numbers are allowed"),
+        (5, "climate: a path or an xarray.Dataset is allowed, got int"),
     ],
 )
 def test_bad_climate(file, message):

@@ -266,6 +266,12 @@ BAD = {
         lambda: tower(lambda t: t.assign(VPD_F=t.VPD_F / 10)),
         r"VPD_F in hPa: relative humidity is above \d+ %",
     ),
+    "starts that are ends": (
+        lambda: tower(
+            lambda t: t.rename(columns={"TIMESTAMP_START": "TIMESTAMP_END", "TIMESTAMP_END": "TIMESTAMP_START"})
+        ),
+        r"row 0: TIMESTAMP_END 2018-12-31 23:30 is not after TIMESTAMP_START 2019-01-01 00:00",
+    ),
     "VPD in Pa": (
         lambda: tower(lambda t: t.assign(VPD_F=t.VPD_F * 100)),
         r"row \d+ .*VPD_F is [\d.]+ hPa; .*say units={'VPD_F': 'Pa'}",
@@ -449,6 +455,21 @@ def test_a_unit_that_is_given_is_believed():
     assert damp.relative_humidity.min() > 0.85
 
 
+@pytest.mark.parametrize(
+    "name, factor, message",
+    [
+        ("VPD_F", 0.1, "2013: VPD_F in hPa: relative humidity is above"),
+        ("SW_IN_F", 0.0864, "2013: SW_IN_F in W m-2: a clear day has"),
+        ("P_F", 0.001, "2013: P_F in mm: precipitation is 0."),
+    ],
+)
+def test_another_unit_in_a_year_of_several_is_refused(name, factor, message):
+    table = pd.read_csv(records.POKER_FLAT)
+    table.loc[table.TIMESTAMP.astype(str).str.replace("-", "").str[:4] == "2013", name] *= factor
+    with pytest.raises(ValueError, match=message):
+        sim.read_forcing(table, **ALASKA)
+
+
 def test_no_unit_makes_light_of_what_is_none():
     with pytest.raises(ValueError, match=r"SW_IN_F in J m-2: a clear day has 0.\d+ % .*of W m-2, J m-2"):
         sim.read_forcing(tower(), units={"SW_IN_F": "J m-2"}, **SWEDEN)
@@ -482,6 +503,15 @@ BAD_FILES = {
     "decimal commas": (
         "TIMESTAMP;TA_F;VPD_F;WS_F;SW_IN_F;P_F\n20190101;1,5;1;1;1;0\n20190102;1,5;1;1;1;0\n",
         r"line 2: TA_F is '1,5'; a number is allowed",
+    ),
+    "names of no one": ("date,t,q\n20190101,1,1\n", r"tower.csv: no column for air temperature: none of TA_F"),
+    "decimal commas between commas": (
+        "TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n20190101,1,5,1,1,10,0\n",
+        r"line 2: 7 fields; the header has 6 names",
+    ),
+    "days before months": (
+        "TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n01.02.2019,1,1,1,10,0\n02.02.2019,1,1,1,10,0\n",
+        r"line 2: TIMESTAMP is '01.02.2019'; a time as 201906031230 or 2019-06-03 12:30 is allowed",
     ),
     "an empty line": (
         "# tower\nTIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n20190101,1,1,1,10,0\n\n20190102,1,1,1,10,0\n",

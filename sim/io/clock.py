@@ -28,7 +28,8 @@ def read_times(table: Table, texts: pd.Series, name: str) -> pd.DatetimeIndex:
         elif _WITH_ZONE.search(first):
             times = pd.to_datetime(text, format="ISO8601", errors="coerce", utc=True)
         else:
-            times = pd.to_datetime(text.where(~text.str.contains(_WITH_ZONE).fillna(False)), errors="coerce")
+            without_zone = text.where(~text.str.contains(_WITH_ZONE).fillna(False))
+            times = pd.to_datetime(without_zone, format="ISO8601", errors="coerce")  # no guess of day and month
     wrong = times.isna().to_numpy()
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -36,6 +37,16 @@ def read_times(table: Table, texts: pd.Series, name: str) -> pd.DatetimeIndex:
             f"{table.where(row)}: {name} is {texts.iloc[row]!r}; a time as 201906031230 or 2019-06-03 12:30 is allowed"
         )
     return pd.DatetimeIndex(times)
+
+
+def check_ends(table: Table, starts: pd.DatetimeIndex, ends: pd.DatetimeIndex) -> None:
+    """Refuse an interval that ends before it begins: its columns may be each other's."""
+    wrong = ends.tz_localize(None) <= starts
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ValueError(
+            f"{table.where(row)}: TIMESTAMP_END {_text(ends[row])} is not after TIMESTAMP_START {_text(starts[row])}"
+        )
 
 
 def interval_of(table: Table, times: pd.DatetimeIndex) -> int:

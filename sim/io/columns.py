@@ -171,11 +171,12 @@ class Choice:
     notes: list[str]
 
 
-def choose(table: list[str], columns: dict | None, units: dict | None, empty) -> Choice:
+def choose(record: str, table: list[str], columns: dict | None, units: dict | None, empty) -> Choice:
     """The columns to use of those that a record has.
 
-    columns : quantity -> column, in place of what we would take; units : column -> unit; empty : function of a column
-    that says whether it has no number. Raises ValueError naming what is missing, unknown or not clear.
+    record : its name; table : its columns; columns : quantity -> column, in place of what we would take; units :
+    column -> unit; empty : function of a column that says whether it has no number. Raises ValueError naming what is
+    missing, unknown or not clear.
     """
     columns, units = dict(columns or {}), dict(units or {})
     for quantity, name in columns.items():
@@ -190,20 +191,20 @@ def choose(table: list[str], columns: dict | None, units: dict | None, empty) ->
     found: dict[str, Column] = {}
     empties: dict[str, list[str]] = {}
     for quantity, names in NAMES.items():
-        name, empties[quantity] = _pick(quantity, names, table, columns, empty)
+        name, empties[quantity] = _pick(record, quantity, names, table, columns, empty)
         if name:
-            found[quantity] = _column(quantity, name, names, table, units)
+            found[quantity] = _column(record, quantity, name, names, table, units)
     by_parts = "eastward_wind" in found and "northward_wind" in found
     for quantity in NEEDED:
         if quantity not in found and not (quantity == "wind_speed" and by_parts):
             what, some = quantity.replace("_", " "), ", ".join(list(NAMES[quantity])[:8])
             if empties[quantity]:
                 raise ValueError(
-                    f"forcing: no number for {what}: {', '.join(empties[quantity])} is empty, or -9999, in every row; "
+                    f"{record}: no number for {what}: {', '.join(empties[quantity])} is empty, or -9999, in every row; "
                     f"another column is named by columns={{{quantity!r}: '..'}}"
                 )
             raise ValueError(
-                f"forcing: no column for {what}: none of {some}, ..; "
+                f"{record}: no column for {what}: none of {some}, ..; "
                 f"name yours: columns={{{quantity!r}: '..'}}; the record has {_some(table)}"
             )
     if "wind_speed" in found or not by_parts:
@@ -212,21 +213,21 @@ def choose(table: list[str], columns: dict | None, units: dict | None, empty) ->
     unused = [name for name in units if name not in used]
     if unused:
         raise ValueError(f"units: {unused[0]} is not used; used are {', '.join(sorted(used))}")
-    time, kind = _time(table, columns, any(OF_REANALYSIS.fullmatch(name) for name in used))
+    time, kind = _time(record, table, columns, any(OF_REANALYSIS.fullmatch(name) for name in used))
     notes = [f"{name} has no number and was passed over" for names in empties.values() for name in names]
     return Choice(found, time, kind, notes)
 
 
-def _pick(quantity, names, table, columns, empty) -> tuple[str | None, list[str]]:
+def _pick(record, quantity, names, table, columns, empty) -> tuple[str | None, list[str]]:
     """The column of a quantity, if the record has one, and which were passed over because they have no number."""
     if quantity in columns:
         name = columns[quantity]
         if empty(name):
-            raise ValueError(f"forcing: column {name}, for {quantity}, has no number")
+            raise ValueError(f"{record}: column {name}, for {quantity}, has no number")
         return name, []
     passed_over: list[str] = []
     for name in names:
-        there = [name] if name in table else _at_positions(name, table)
+        there = [name] if name in table else _at_positions(record, name, table)
         for column in there:
             if not empty(column):
                 return column, passed_over
@@ -234,24 +235,26 @@ def _pick(quantity, names, table, columns, empty) -> tuple[str | None, list[str]
     return None, passed_over
 
 
-def _at_positions(name: str, table: list[str]) -> list[str]:
+def _at_positions(record: str, name: str, table: list[str]) -> list[str]:
     """Columns of a quantity with the position of their sensor: the first one, or the only one."""
     at = [column for column in table if column.startswith(name) and _POSITION.fullmatch(column[len(name) :])]
     first = [f"{name}_1_1_1", f"{name}_1"]
     best = [column for column in first if column in at] or at
     if len(at) > 1 and best == at:
         quantity = next(quantity for quantity, names in NAMES.items() if name in names)
-        raise ValueError(f"forcing: {', '.join(at)} could be {quantity}; name one: columns={{{quantity!r}: {at[0]!r}}}")
+        raise ValueError(
+            f"{record}: {', '.join(at)} could be {quantity}; name one: columns={{{quantity!r}: {at[0]!r}}}"
+        )
     return best[:1]
 
 
-def _column(quantity, name, names, table, units) -> Column:
+def _column(record, quantity, name, names, table, units) -> Column:
     base = name if name in names else next((n for n in names if _POSITION.fullmatch(name.removeprefix(n))), None)
     unit = units.get(name, names.get(base) if base else None)
     kinds = ("deficit", "relative_humidity", "dew_point") if quantity == "humidity" else (quantity,)
     allowed = [u for kind in kinds for u in _UNITS[kind]]
     if unit is None:
-        raise ValueError(f"forcing: the unit of {name} is not known; say units={{{name!r}: ..}}: {', '.join(allowed)}")
+        raise ValueError(f"{record}: the unit of {name} is not known; say units={{{name!r}: ..}}: {', '.join(allowed)}")
     kind = next((kind for kind in kinds if unit in _UNITS[kind]), None)
     if kind is None:
         raise ValueError(f"units: {name} in {unit!r}; allowed for {quantity}: {', '.join(allowed)}")
@@ -261,7 +264,7 @@ def _column(quantity, name, names, table, units) -> Column:
     return Column(name, kind, unit, name in units, quality, same)
 
 
-def _time(table, columns, reanalysis: bool) -> tuple[str, str]:
+def _time(record, table, columns, reanalysis: bool) -> tuple[str, str]:
     """The column of times, and what they are: "start", "end", "instant" or "day"."""
     given = [quantity for quantity in TIMES if quantity in columns]
     if given:
@@ -274,8 +277,8 @@ def _time(table, columns, reanalysis: bool) -> tuple[str, str]:
         if name in table:
             return name, "instant" if reanalysis else "day"
     raise ValueError(
-        "forcing: no column of times: none of TIMESTAMP_START, TIMESTAMP_END, TIMESTAMP, valid_time, time; name yours: "
-        f"columns={{'time_start': '..'}} or 'time_end'; the record has {_some(table)}"
+        f"{record}: no column of times: none of TIMESTAMP_START, TIMESTAMP_END, TIMESTAMP, valid_time, time; name "
+        f"yours: columns={{'time_start': '..'}} or 'time_end'; the record has {_some(table)}"
     )
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 
 from sim.io import gaps as filling
 from sim.io import reanalysis
-from sim.io.clock import DAY, hours_apart, interval_of, kind_of_times, minutes_ahead, noon_of, read_times
+from sim.io.clock import DAY, check_ends, hours_apart, interval_of, kind_of_times, minutes_ahead, noon_of, read_times
 from sim.io.columns import LIMITS, NAMES, Choice, Column, choose
 from sim.io.disaggregation import FOREST_CYCLE, DiurnalCycle, half_hours, saturation_water
 from sim.io.longwave import cloud_cover, longwave
@@ -82,11 +82,14 @@ def read_forcing(
     """
     _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_gap_days, diurnal_cycle)
     table = open_table(source)
-    rows = table.read(_recognised(table.columns, columns, units))
-    if not len(rows):
+    recognised = _recognised(table.columns, columns, units)
+    rows = table.read(recognised)
+    if recognised and not len(rows):
         raise ValueError(f"{table.name}: 0 rows; whole days at a regular interval are allowed")
-    choice = choose(table.columns, columns, units, lambda name: _is_empty(rows[name]))
+    choice = choose(table.name, table.columns, columns, units, lambda name: _is_empty(rows[name]))
     times = read_times(table, rows[choice.time], choice.time)
+    if choice.time == "TIMESTAMP_START" and "TIMESTAMP_END" in rows and times.tz is None:
+        check_ends(table, times, read_times(table, rows["TIMESTAMP_END"], "TIMESTAMP_END"))
     if times.tz is not None:
         if utc_offset_h is not None:
             raise ValueError("utc_offset_h: the record's times have a time zone already; None is allowed")

@@ -34,11 +34,18 @@ def check_sun(name: str, weather: pd.DataFrame, interval: int, expected_h: float
 def check_units(
     name: str, weather: pd.DataFrame, columns: dict[str, Column], latitude_deg: float, interval: int
 ) -> None:
-    """Refuse values within their limits that must be of another unit. Dry air, damp air and little rain pass where the
-    caller gave the unit; light that no sky gives, and rain of no climate, do not.
+    """Refuse values within their limits that must be of another unit, in all of the record or in a year. Dry air, damp
+    air and little rain pass where the caller gave the unit; light that no sky gives, and rain of no climate, do not.
 
     weather : by local solar time, the record's quantities, relative humidity and precipitation of an interval.
     """
+    _check_units(name, weather, columns, latitude_deg, interval)
+    for year, part in weather.groupby(pd.DatetimeIndex(weather.index).year):
+        if DAYS_OF_A_YEAR * 1440 <= len(part) * interval < len(weather) * interval:
+            _check_units(f"{name}, {year}", part, columns, latitude_deg, interval)
+
+
+def _check_units(name, weather, columns, latitude_deg, interval) -> None:
     days = weather.groupby(weather.index.normalize()).mean()
     dates = pd.DatetimeIndex(days.index)
 

@@ -86,6 +86,8 @@ def _csv(path: Path) -> Table:
     if twice:
         raise ValueError(f"forcing: {path.name}, line {comments + 1}: column {twice[0]} is there twice")
 
+    _check_fields(path, separator, len(columns))
+
     def read(names: list[str]) -> pd.DataFrame:
         # times stay text; a row of nothing is a row, so that lines can be counted
         table = pd.read_csv(
@@ -105,6 +107,15 @@ def _csv(path: Path) -> Table:
         return table.iloc[: len(table) - int(np.argmin(empty[::-1])) if len(table) and not empty.all() else 0]
 
     return Table(path.name, columns, read, first_line=comments + 2)
+
+
+def _check_fields(path: Path, separator: str, most: int) -> None:
+    """Refuse a row of more fields than there are names, such as of decimal commas: it would be read shifted."""
+    with gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else path.open(encoding="utf-8") as file:
+        for number, line in enumerate(file, start=1):
+            fields = line.rstrip(f"{separator}\r\n").count(separator) + 1
+            if fields > most and '"' not in line and not line.startswith("#"):
+                raise ValueError(f"forcing: {path.name}, line {number}: {fields} fields; the header has {most} names")
 
 
 def _is_time(name: str) -> bool:

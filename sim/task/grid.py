@@ -41,8 +41,12 @@ def sites_on_grid(latitudes, longitudes, climate=None) -> pd.DataFrame:
 def check_axis(name: str, values) -> np.ndarray:
     """Latitudes or longitudes in increasing order, each once."""
     low, high, unit = COLUMNS[name]
-    numbers = np.unique(np.asarray(values, dtype=float))
-    if np.ndim(values) != 1 or not len(numbers) or not ((numbers >= low) & (numbers <= high)).all():
+    try:
+        numbers = np.unique(np.asarray(values, dtype=float))
+        allowed = np.ndim(values) == 1 and len(numbers) and ((numbers >= low) & (numbers <= high)).all()
+    except (TypeError, ValueError):  # text, or rows of several lengths
+        allowed = False
+    if not allowed:
         raise ValueError(f"{name}: a sequence of numbers in [{low:g}, {high:g}] {unit} is allowed, got {values!r}")
     return numbers
 
@@ -60,12 +64,15 @@ def climate_at(climate, latitude: np.ndarray, longitude: np.ndarray) -> pd.DataF
             raise ValueError(f"climate: {climate} cannot be read as a NetCDF file or a zarr store") from error
         with file:
             return climate_at(file, latitude, longitude)
+    if not isinstance(climate, xarray.Dataset):
+        raise ValueError(f"climate: a path or an xarray.Dataset is allowed, got {type(climate).__name__}")
     axes: dict[str, str] = {}
     for name, names in AXES.items():
         found = [one for one in names if one in climate.coords and climate[one].ndim == 1]
         if not found:
             raise ValueError(f"climate: it has no coordinate {' or '.join(names[1:])} of one dimension")
         axes[found[0]] = name
+        check_coordinate(found[0], climate[found[0]].to_numpy())
     grid = climate.rename(axes)
     grid = grid.assign_coords({LONGITUDE: wrapped(grid[LONGITUDE])}).sortby([LATITUDE, LONGITUDE])
     points = {LATITUDE: ("point", latitude), LONGITUDE: ("point", wrapped(longitude))}
@@ -81,11 +88,22 @@ def climate_at(climate, latitude: np.ndarray, longitude: np.ndarray) -> pd.DataF
             raise ValueError(
                 f"climate: {name} has dimensions {grid[name].dims}; {months}latitude, longitude are allowed"
             )
+        if grid[name].dtype.kind not in "iuf":
+            raise ValueError(f"climate: {name} has type {grid[name].dtype}; numbers are allowed")
         values = nearest(grid[name], points).transpose("point", ...).to_numpy().astype(float)
         columns |= dict(zip(CLIMATE, mean_and_amplitude(values), strict=True)) if name == MONTHLY else {name: values}
     if not columns:
         raise ValueError("climate: it has no variable")
     return pd.DataFrame(columns)
+
+
+def check_coordinate(name: str, values: np.ndarray) -> None:
+    """Refuse a coordinate of a file that is no number somewhere, or twice the same."""
+    if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+        raise ValueError(f"climate: coordinate {name} has a value that is missing or no number")
+    found, counts = np.unique(values, return_counts=True)
+    if (counts > 1).any():
+        raise ValueError(f"climate: coordinate {name} has {found[counts > 1][0]:g} twice; each once is allowed")
 
 
 def wrapped(longitude):

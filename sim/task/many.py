@@ -13,12 +13,14 @@ import os
 import re
 import shutil
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pandas as pd
 
@@ -59,6 +61,9 @@ OTHERS = ("middle", "sampled")
 
 #: Arguments of an environment that a table of sites leaves no room for.
 NOT_OF_MANY = ("mode", "years", "site_seed", "fixed_preference", "parameter_overrides", "record_years")
+
+#: Arguments of the world that a policy was trained in, and may have to be told again.
+WORLD = ("weather", "boundary", "soil_carbon", "scenario")
 
 PROBES = 256
 CHUNK_STAND_YEARS, LARGEST_CHUNK = 51_200, 4096  # a chunk: half a minute on two cores, and 0.2 GB
@@ -129,8 +134,9 @@ def simulate_many(
         if find_spec(package) is None:
             raise ValueError(f'simulate_many needs {package}: pip install -e ".[region]"')
     table = check_sites(sites, others, seed)
-    one = check_world(years, arguments, table)
+    one = check_world(years, threads, arguments, table)
     chosen, label = check_choice(actions, label, len(table), one)
+    tell_of_training(actions, arguments)
     size = chunk_size(len(table), one.years)
     plan = Plan(
         table=table,
@@ -333,10 +339,11 @@ def check_column(column: pd.Series, low: float, high: float, unit: str) -> np.nd
     """The numbers of a column, all within its limits."""
     whole = column.name == SEED
     numbers = pd.to_numeric(column, errors="coerce")
-    wrong = ~((numbers >= low) & (numbers <= high)).to_numpy()
+    values = numbers.to_numpy(float, na_value=np.nan)
+    wrong = ~((values >= low) & (values <= high))
     if whole:
-        wrong |= (numbers % 1 != 0).to_numpy()
-    if column.dtype == bool:
+        wrong |= values % 1 != 0
+    if column.dtype.kind in "bc":  # truth values, complex numbers
         wrong[:] = True
     if wrong.any():
         k = int(wrong.argmax())
@@ -346,10 +353,10 @@ def check_column(column: pd.Series, low: float, high: float, unit: str) -> np.nd
             f"sites: {row_of(column.index, k)}, column {column.name} is {value}; "
             f"{kind} in [{low:g}, {high:g}]{f' {unit}' if unit not in ('', '1') else ''} is allowed"
         )
-    return numbers.to_numpy(np.int64 if whole else float)
+    return numbers.to_numpy(np.int64) if whole else values
 
 
-def check_world(years: int, arguments: dict, table: pd.DataFrame) -> Episodes:
+def check_world(years: int, threads: int | None, arguments: dict, table: pd.DataFrame) -> Episodes:
     """One episode of the world that the arguments name, to ask it for names."""
     for name in arguments:
         if name not in ARGUMENTS or name in NOT_OF_MANY:
@@ -358,7 +365,17 @@ def check_world(years: int, arguments: dict, table: pd.DataFrame) -> Episodes:
     for name, how in ((BOUNDARY, "boundary"), ("soil_kgc_m2", "soil_carbon")):
         if arguments.get(how) == "balanced" and name in table:
             raise ValueError(f"sites: column {name}: {how}='balanced' finds it; values of your own are not allowed")
-    return Episodes(1, threads=1, years=years, **arguments)
+    return Episodes(1, threads=threads, years=years, **arguments)
+
+
+def tell_of_training(policy, arguments: dict) -> None:
+    """Warn of a policy that was trained in a world of which the arguments say nothing."""
+    env_id = getattr(policy, "env_id", None)
+    trained = gym.registry[env_id].kwargs if env_id in gym.registry else {}
+    unsaid = [f"{name}={trained[name]!r}" for name in WORLD if name in trained and name not in arguments]
+    if unsaid:
+        what = f"policy {policy.name!r} was trained with {', '.join(unsaid)}"
+        warnings.warn(f"{what}; here the defaults are taken, unless you say others", stacklevel=3)
 
 
 def check_choice(actions, label: str | None, sites: int, one: Episodes) -> tuple[Any, str]:

@@ -1,0 +1,20 @@
+"""A region that is killed where it is, by its own command."""
+
+import pytest
+
+from analysis import excerpts, region_killed
+
+
+@pytest.mark.slow
+def test_a_small_region_is_killed_and_the_page_says_what_came_of_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert excerpts.region_killed() == "Not measured yet.\n"
+    region_killed.main(region_killed.Args(stands=12, kills=1))
+    said = excerpts.region_killed()
+    assert "12 stands under `ppo_group-balanced` for 2 years, in steps of 120 minutes, killed 1 times" in said
+    assert "the same bytes as a run that was left alone" in said
+
+
+def test_no_stands_are_refused():
+    with pytest.raises(SystemExit, match="--stands 0: at least 1 is needed"):
+        region_killed.main(region_killed.Args(stands=0))
