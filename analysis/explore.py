@@ -11,6 +11,10 @@ import html
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
+from cleanrl_style.flags import require
+
+require("panel", "torch", extra="explore")
+
 import numpy as np
 import panel as pn
 import tyro

@@ -7,6 +7,10 @@ opposite actions (4 cuts 100 stems, 5 cuts 50). Crossover exchanges a stretch of
 from collections.abc import Callable
 from typing import NamedTuple
 
+from cleanrl_style.flags import require
+
+require("pymoo", extra="analysis")
+
 import numpy as np
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.mutation import Mutation
