@@ -36,7 +36,7 @@ def check_flags(args: Args) -> None:
 
 
 if __name__ == "__main__":
-    require("panel", extra="explore")
+    require("panel", "torch", extra="explore")
     args = parse(Args)  # a bad flag is answered before all that follows is loaded
     check_flags(args)
 

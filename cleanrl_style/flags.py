@@ -57,7 +57,8 @@ def require(*packages: str, extra: str = "train") -> None:
     """End the script if one of the packages of an extra is not installed."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
-        fail(f"not installed: {', '.join(missing)}; in the project's folder: pip install -e '.[{extra}]'")
+        limit = " with Python 3.11 to 3.13" if "morl_baselines" in missing else ""  # see pyproject.toml
+        fail(f"not installed: {', '.join(missing)}; in the project's folder: pip install -e '.[{extra}]'{limit}")
 
 
 def shipped_policies() -> dict[str, Path]:

@@ -36,11 +36,17 @@ def test_a_fixed_strategy_answers_as_soon():
 
 
 @pytest.mark.parametrize(
-    "script, package", [("cleanrl_style/ppo_gated.py", "torch"), ("baselines_heuristic/zero_change.py", "tyro")]
+    "script, package, extra",
+    [
+        ("cleanrl_style/ppo_gated.py", "torch", "train"),
+        ("baselines_heuristic/zero_change.py", "tyro", "train"),
+        ("analysis/explore.py", "panel", "explore"),
+        ("analysis/outside/maskable_ppo.py", "sb3_contrib", "outside"),
+    ],
 )
-def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, script, package):
+def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, script, package, extra):
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(SystemExit, match=rf"^error: not installed: {package}; .*pip install -e '\.\[train\]'$"):
+    with pytest.raises(SystemExit, match=rf"^error: not installed: {package}; .*pip install -e '\.\[{extra}\]'$"):
         run_script(script)
 
 

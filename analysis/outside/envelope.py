@@ -7,6 +7,10 @@ Settings are those of the library's example of discrete actions (minecart), but 
 
 from dataclasses import dataclass
 
+from cleanrl_style.flags import require
+
+require("morl_baselines", extra="outside")
+
 import torch
 from morl_baselines.multi_policy.envelope.envelope import Envelope
 

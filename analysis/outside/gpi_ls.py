@@ -8,6 +8,10 @@ its own evaluation, which count in no budget; cost.csv says how many steps they 
 
 from dataclasses import dataclass
 
+from cleanrl_style.flags import require
+
+require("morl_baselines", extra="outside")
+
 import numpy as np
 import torch
 from morl_baselines.multi_policy.gpi_pd.gpi_pd import GPILS

@@ -7,6 +7,10 @@ Settings are the library's own.
 
 from dataclasses import dataclass
 
+from cleanrl_style.flags import require
+
+require("sb3_contrib", extra="outside")
+
 import gymnasium as gym
 import numpy as np
 import torch

@@ -8,6 +8,10 @@ its archive by its own evaluation, which counts in no budget; cost.csv says how 
 
 from dataclasses import dataclass
 
+from cleanrl_style.flags import require
+
+require("morl_baselines", extra="outside")
+
 import numpy as np
 import torch
 from morl_baselines.common.buffer import ReplayBuffer

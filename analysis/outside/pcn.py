@@ -7,6 +7,10 @@ At a weight it is told the return of the best episode for that weight that it re
 
 from dataclasses import dataclass
 
+from cleanrl_style.flags import require
+
+require("morl_baselines", extra="outside")
+
 import numpy as np
 import torch
 from morl_baselines.common.pareto import get_non_dominated_inds

@@ -3,6 +3,10 @@ genes anew."""
 
 from collections.abc import Callable
 
+from cleanrl_style.flags import require
+
+require("pymoo", extra="analysis")
+
 import numpy as np
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.mutation import Mutation

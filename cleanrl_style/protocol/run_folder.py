@@ -450,7 +450,7 @@ def folder_name(env_id: str, changed: dict) -> str:
 
 def versions() -> dict:
     """Versions of Python and of the packages that the numbers depend on."""
-    packages = ("numpy", "numba", "gymnasium", "mo-gymnasium", "torch", "pandas", "matplotlib", "moocore")
+    packages = ("numpy", "numba", "gymnasium", "torch", "pandas", "matplotlib", "moocore")
     found = {name: importlib.metadata.version(name) for name in packages}
     return {"python": platform.python_version(), **found}
 
