@@ -41,8 +41,9 @@ phase = numba.njit(**OPTIONS)
 def cache_folder() -> Path:
     """Folder of the compiled kernels: `$NUMBA_CACHE_DIR` or the user's cache, then a hash of all they depend on."""
     cpu = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
-    digest = hashlib.sha256(repr((numba.__version__, sys.version, cpu)).encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    here = Path(__file__).parent  # numba keeps the kernels of each checkout apart
+    digest = hashlib.sha256(repr((numba.__version__, sys.version, cpu, here)).encode())
+    for path in sorted(here.glob("*.py")):
         digest.update(path.read_bytes())
     try:
         user_cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"

@@ -1,4 +1,4 @@
-"""Sites outside the range that is sampled: how far a policy generalises, by one property at a time."""
+"""Sites outside the range that is sampled: how far a policy generalises, by one property or two at a time."""
 
 from sim.parameters import check_name
 from sim.spin_up import BOUNDARY
