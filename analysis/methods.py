@@ -61,7 +61,7 @@ def scripts(*kinds: str) -> tuple[str, ...]:
 
 
 LEARNERS = scripts(CONDITIONED)
-TRAINED = scripts(CONDITIONED, FIXED_WEIGHT, OTHERS)
+TRAINED = scripts(CONDITIONED, FIXED_WEIGHT, OTHERS, POPULATION)
 STRATEGIES = scripts(HEURISTIC, CONTROL)
 OUTSIDE = scripts(OTHERS)
 

@@ -209,9 +209,8 @@ if __name__ == "__main__":
     task = protocol.make_task(args, hide_site=args.hide_site)
     if not task.boreal:
         protocol.fail(f"--env-id {args.env_id}: candidates know the boreal environments alone")
-    if args.episodes_each is None:
-        args.episodes_each = 1 if task.mode == "site-specific" else 8
-    args.num_envs = args.population * args.episodes_each
+    episodes_each = args.episodes_each or (1 if task.mode == "site-specific" else 8)
+    args.num_envs = args.population * episodes_each
     if args.num_envs > protocol.MAX_ENVS:
         protocol.fail(f"--population x --episodes-each {args.num_envs}: {protocol.MAX_ENVS} at most are allowed")
     steps_a_generation = args.num_envs * task.years
@@ -230,7 +229,7 @@ if __name__ == "__main__":
         # env setup: candidate i has the environments i * episodes_each and on, and all candidates the same seeds
         envs = run.make_envs()
         start_seed = args.seed * protocol.MAX_ENVS
-        seeds = [start_seed + k for _ in range(args.population) for k in range(args.episodes_each)]
+        seeds = [start_seed + k for _ in range(args.population) for k in range(episodes_each)]
         lattice = np.array([task.check_weights(w) for w in fronts.evaluation_weights(task.num_objectives)])
 
         names = task.make().unwrapped.observation_names
@@ -264,7 +263,7 @@ if __name__ == "__main__":
             genes = asked.get("X").astype(float)
             # all stands play: those left over where pymoo found fewer new candidates repeat the first
             agent.genes.copy_(torch.from_numpy(np.resize(genes, first.shape)))
-            of_stand = np.arange(args.population).repeat(args.episodes_each)
+            of_stand = np.arange(args.population).repeat(episodes_each)
 
             next_obs, _ = envs.reset(seed=seeds)
             preferences = protocol.observed_weights(next_obs, task.num_objectives)
@@ -276,14 +275,14 @@ if __name__ == "__main__":
                 returns += rewards
                 progress.show(global_step)
             run.time("environment", global_step, time.perf_counter() - start)
-            for i in range(len(genes) * args.episodes_each):
+            for i in range(len(genes) * episodes_each):
                 episode += 1
                 row = {"global_step": global_step, "episode": episode, "env": i}
                 row |= task.returns_row(preferences[i], returns[i]) | protocol.final_info(infos, i)
                 run.log("episodes", row)
                 progress.returns.append(returns[i])
 
-            means = returns.reshape(args.population, args.episodes_each, -1).mean(axis=1)
+            means = returns.reshape(args.population, episodes_each, -1).mean(axis=1)
             zero_change = means[0] if zero_change is None else zero_change  # the very first candidate does nothing
             gains = (means - zero_change)[: len(genes)]
             tell(algorithm, asked, gains)
