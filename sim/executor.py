@@ -102,7 +102,9 @@ class Cluster:
                 ray.init(address, log_to_driver=False, logging_level="ERROR", **(here if address == RAY_HERE else {}))
             except ConnectionError as error:
                 raise NoCluster(f"address {address!r}: no Ray cluster answers there ({error})") from error
-            except Exception as error:  # Ray's own kind where a busy machine does not start it in half a minute
+            except Exception as error:
+                if type(error) is not Exception:  # Ray raises this bare kind where it does not start in half a minute
+                    raise
                 raise NoCluster(f"address {address!r}: Ray does not start ({error})") from error
 
     def width(self) -> int:
