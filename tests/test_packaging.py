@@ -6,7 +6,7 @@ import tomllib
 from scripts import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-TESTED = ("train", "analysis", "test")  # extras
+TESTED = ("train", "planners", "test")  # extras
 
 
 def requirements():

@@ -4,7 +4,7 @@
     python analysis/studies/fronts.py --without-mechanisms   # 3 typical ones, each mechanism of the physics off in turn
 
 A plan is an action for every block of five years. It is sought on four weathers and reported on sixteen others, as
-returns and as gains: the return less that of zero change on the same weather. Needs `pip install -e ".[analysis]"`.
+returns and as gains: the return less that of zero change on the same weather. Needs `pip install -e ".[planners]"`.
 A site is one table in results/fronts; a command that was stopped goes on with the next.
 """
 
@@ -197,7 +197,7 @@ def most_episodes(budget: Budget) -> int:
 
 def main(args: Args) -> None:
     """Search every case that is not finished, write the summary, print it."""
-    require("pymoo", extra="analysis")
+    require("pymoo", extra="planners")
     most = 3 if args.without_mechanisms else open_loop.CANDIDATES
     if args.sites is not None and not 1 <= args.sites <= most:
         sys.exit(f"fronts.py: --sites {args.sites}: 1 to {most} are allowed")

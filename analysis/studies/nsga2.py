@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from cleanrl_style.flags import require
 
-require("pymoo", extra="analysis")
+require("pymoo", extra="planners")
 
 import numpy as np
 from pymoo.algorithms.moo.nsga2 import NSGA2
