@@ -53,11 +53,11 @@ def markdown(header, rows) -> str:
 def speed() -> str:
     """Times of episodes, trainings and starts, beside the paper's."""
     table = figures(SPEEDS)
-    repeats = " or ".join(map(str, sorted(set(table.repeats))))
+    repeats = " or ".join(map(str, sorted(set(table.repeats[table.low < table.high]))))
     rows = []
     for row in table.itertuples():
         middle, low, high = (f"{time:#.2g}".rstrip(".") for time in (row.median, row.low, row.high))
-        spread = f" ({low}-{high})" if low != high else ""
+        spread = " (once)" if row.low == row.high else f" ({low}-{high})" if low != high else ""
         rows.append([SPEEDS[row.Index], f"{middle} {row.unit}{spread}", row.paper])
     return markdown(["speed", f"here: median of {repeats} (lowest-highest)", "paper"], rows)
 
@@ -158,7 +158,7 @@ def gradient() -> str:
 
     def episodes(baseline, objective="preference"):
         row = needed.loc[baseline, objective]
-        return f"{row.episodes:,.0f} [{row.episodes_low:,.0f}, {row.episodes_high:,.0f}] episodes"
+        return f"{with_interval(row, 'episodes')} episodes"
 
     return (
         f"At the start of a training EUPG's gradient has as much signal as noise after "

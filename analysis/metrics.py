@@ -228,7 +228,8 @@ def score_interval(gained: np.ndarray, plans: np.ndarray | None, repetitions: in
 def seeds_to_tell(values: np.ndarray, difference: float = 0.1, power: float = 0.8) -> float:
     """Training seeds a method that tell two methods apart, which differ so much, on the same sites (NaN below two).
 
-    By a two-sided t test at 5 %; both vary between seeds as the values do.
+    By a two-sided t test at 5 %; both vary between seeds as the values do. That deviation is itself uncertain: of three
+    values the true one is half to six times as large (95 %).
     """
     values = np.asarray(values, dtype=float)
     if len(values) < 2:

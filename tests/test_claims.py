@@ -17,6 +17,7 @@ from analysis.paper_claims import (
     performance,
     preference,
     speed,
+    summary,
 )
 from analysis.paper_claims.claim import (
     COMPARED,
@@ -30,7 +31,9 @@ from analysis.paper_claims.claim import (
     SEEDS,
     UNDECIDED,
     UNTESTABLE,
+    Finding,
     Number,
+    Row,
     about,
     above,
     all_of,
@@ -253,6 +256,22 @@ def test_heuristics_are_paired_over_episodes(tmp_path):
     assert finding.verdict == FAILS
 
 
+def test_that_management_can_is_shown_by_one_strategy_that_does(tmp_path):
+    write_run(tmp_path / "zero", "zero_change", carbon=(0,) * 3, thaw=(0,) * 3)
+    write_run(tmp_path / "plus", "plus_100", carbon=(-1,) * 3, thaw=(2,) * 3)
+    write_run(tmp_path / "conifers", "conifer_restoration", carbon=(0,) * 3, thaw=(-1,) * 3)
+    finding, ours = found(mechanisms.management_protects, tmp_path)
+    assert finding.verdict == HOLDS and ours["thaw gain over zero change, +100 a year"].value == 2
+    assert ours["thaw gain over zero change, conifer restoration"].value == -1
+
+
+def test_a_sentence_says_what_its_number_is_over():
+    sentence = summary.Sentence(performance.curriculum_beats_gated, "x", "Yes", "No", "Open")
+    row = Row("x", "4", seeds(1, 0.5, 2, count=3))
+    said = sentence.text(7, Finding([row], UNDECIDED))
+    assert said == "Open (x: 1 [0.5, 2] over 3 training seeds, the paper's 4; [claim 7](#claim-7))."
+
+
 def test_what_is_learnt_is_measured_from_random_actions(tmp_path):
     studies = tmp_path / "studies"
     rows = [
@@ -456,6 +475,8 @@ def test_the_jobs_fill_every_claim(tmp_path):
     }  # no benchmark was run
     assert all(one.rows for one in findings.values() if one.verdict != NO_RUNS)
     assert not [row for one in findings.values() for row in one.rows if row.ours == "not run yet"]
+    for one in summary.SENTENCES:
+        assert one.row in {row.what for row in findings[one.claim].rows}
 
 
 @pytest.mark.slow

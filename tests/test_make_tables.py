@@ -1,6 +1,7 @@
 import shutil
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from analysis.tables import (
     growing_season_correlations,
     learning_difficulty,
     physical_conflicts,
+    runtime,
     single_sites,
 )
 from analysis.tables.common import FORMATS, has_numbers
@@ -82,6 +84,21 @@ def test_strategies_and_fluxes(tables):
     flux = read(tables, "warming_flux", "formulation")
     assert flux.loc["asymmetric", "zero_change_warming"] == 6 and flux.loc["asymmetric", "seeds"] == 0
     assert flux.paper_warming.tolist() == [0.1, 2.0, 5.0]
+
+
+def test_runs_that_were_not_timed_are_in_no_number_of_runs():
+    timed = pd.DataFrame({"phase": runtime.PHASES, "seconds": 3600.0})
+    runs = {"ppo_gated": [timed, timed[:0]], "eupg_var_lambda": [timed[:0]]}
+    results = SimpleNamespace(
+        first_job=lambda experiment, script: SimpleNamespace(steps=300),
+        of=lambda experiment, script: [
+            SimpleNamespace(runs=[SimpleNamespace(tables={"timing": table})]) for table in runs.get(script, [])
+        ],
+    )
+    table = runtime.make(results).set_index("quantity")
+    assert table.loc["gated PPO, generalist, 300 steps on one core: training", ["seeds", "ours"]].tolist() == [1, 2.0]
+    assert np.isnan(table.seeds["EUPG, generalist, 300 steps on one core: training"])  # run, and not timed
+    assert table.seeds["curriculum PPO, generalist, 300 steps on one core: training"] == 0
 
 
 def test_season_violations_runtime_details(tables):

@@ -188,6 +188,14 @@ def test_bootstrap_interval():
     assert np.isnan(metrics.bootstrap_interval([2.0])).all()
 
 
+@pytest.mark.parametrize(("seeds", "covered"), [(3, 0.75), (5, 0.91)])
+def test_few_seeds_have_intervals_that_are_too_narrow(seeds, covered):
+    """As README.md and docs/results.md say of them."""
+    samples = np.random.default_rng(1).normal(size=(400, seeds))
+    ends = np.array([metrics.bootstrap_interval(values, repetitions=300) for values in samples])
+    assert ((ends[:, 0] < 0) & (ends[:, 1] > 0)).mean() == pytest.approx(covered, abs=0.04)
+
+
 def test_violations_expected_of_a_random_order():
     # three points on a front: one of their six orders has no violation, two have one of two, three have two
     front = np.array([[0.0, 2.0], [1.0, 1.0], [2.0, 0.0]])

@@ -2,6 +2,7 @@
 
 import re
 
+import pandas as pd
 import pytest
 from scripts import ROOT
 
@@ -52,6 +53,18 @@ def test_times_are_shown_in_minutes(tmp_path, monkeypatch):
         "command,seconds,machine\npytest,330,2 cores of X\npip,61,2 cores of X\n"
     )
     assert excerpts.times() == "*On 2 cores of X: `pytest` 6 min, `pip` 61 s.*\n"
+
+
+def test_a_speed_that_was_measured_once_says_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "results").mkdir()
+    row = {"unit": "s", "median": 0.3, "low": 0.2, "high": 0.4, "repeats": 3, "paper": ""}
+    table = pd.DataFrame([{"what": name} | row for name in excerpts.SPEEDS]).set_index("what")
+    table.loc["first start, 16 stands", ["median", "low", "high"]] = 31.0
+    table.to_csv(tmp_path / "results" / "benchmark.csv")
+    lines = excerpts.speed().splitlines()
+    assert "median of 3 (lowest-highest)" in lines[0] and "0.30 s (0.20-0.40)" in lines[2]
+    assert "| first start, the physics compiled | 31 s (once) |  |" in lines
 
 
 def test_excerpts_read_the_pages():

@@ -222,11 +222,11 @@ def weight_points(ax, replicates, marker="o"):
         edgecolors="black",
         linewidths=0.5,
     )
-    for weight in (front.index[0], front.index[-1]):
+    for weight, offset in ((front.index[0], (-7, -8)), (front.index[-1], (4, 4))):  # apart where both are one point
         ax.annotate(
             f"{weight:g}",
             front.loc[weight, ["thaw_return", "carbon_return"]],
-            xytext=(4, 4),
+            xytext=offset,
             textcoords="offset points",
             fontsize=6,
         )

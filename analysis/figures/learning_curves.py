@@ -24,9 +24,9 @@ MADE_BY = "python analysis/reproduce.py --only main"
 PARTS = 20  # of the training; fewer than of a learning curve, as a part of the episodes has a gain
 CAPTION = (
     "Sums over 50 years: (a-c) returns of training episodes, (d-f) less those of zero change on the same "
-    f"episodes; {SEEDS_95}. Dashed, dotted: fixed strategies, their mean gain on the evaluation's sites, which "
-    "are others and milder, in (a-c) added to zero change's mean return in training; the best constant plan is "
-    "that of each weight."
+    f"episodes; {SEEDS_95}. Dashed, dotted, where (d-f) have been run: fixed strategies, their mean gain on the "
+    "evaluation's sites, which are others, in (a-c) added to zero change's mean return in training; the best constant "
+    "plan is that of each weight."
 )
 BEST = "Best constant plan"
 QUANTITIES = {"carbon": "carbon", "thaw": "thaw", "scalarized": "scalarised"}

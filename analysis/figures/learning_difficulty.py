@@ -12,8 +12,8 @@ SIZE = (7, 5.8)
 MADE_BY = "python analysis/studies/variance.py && python analysis/reproduce.py --only difficulty"
 CAPTION = (
     f"(b)-(d) one action in year {YEAR} under uniformly random valid actions, the same sites and weathers with either "
-    "action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside. (d) half of the episodes "
-    "have either action; dashed line: those of a training run."
+    "action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside. (b, d) what lies beyond an axis is not "
+    "drawn. (d) half of the episodes have either action; dashed line: those of a training run."
 )
 COMPONENTS = {
     "site": "#0072B2",

@@ -27,10 +27,7 @@ MAIN = only("main")
 ORDER = list(paper("main_results").method)
 HEURISTICS = sorted(methods.scripts(methods.HEURISTIC), key=lambda script: ORDER.index(methods.paper_name(script)))
 CURRICULUM, GATED, EUPG = "ppo_curriculum", "ppo_gated", "eupg_var_lambda"
-SITES_DECIDE = (
-    "Ours and the paper's returns are of two simulators. Warming counts more than cooling, so that a return can be "
-    "negative though more heat leaves the ground than enters it."
-)
+SITES_DECIDE = "Ours and the paper's returns are of two simulators."
 
 
 def published(script: str) -> pd.Series:

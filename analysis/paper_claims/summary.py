@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from analysis.paper_claims import asymmetry, curriculum, mechanisms, paper_itself, performance, preference
-from analysis.paper_claims.claim import CONTRADICTS, DIRECTION, FAILS, HOLDS, Claim, Finding
+from analysis.paper_claims.claim import CONTRADICTS, DIRECTION, FAILS, HOLDS, Claim, Finding, Number
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class Sentence:
         row = next((row for row in found.rows if row.what == self.row), None)
         numbers = "not run yet"
         if row is not None:
-            numbers = f"{row.what}: {row.ours}" + (f", the paper's {row.paper}" if row.paper else "")
+            over = f" over {row.ours.basis}" if isinstance(row.ours, Number) and row.ours.basis else ""
+            numbers = f"{row.what}: {row.ours}{over}" + (f", the paper's {row.paper}" if row.paper else "")
         return f"{words} ({numbers}; [claim {number}](#claim-{number}))."
 
 
@@ -81,9 +82,10 @@ SENTENCES = (
     ),
     Sentence(
         mechanisms.stems,
-        "thaw return that interception adds",
-        "Stems help permafrost by the snow that they catch and harm it by what they absorb, as the paper says",
-        "Snow caught by stems and what they absorb do not work on permafrost as the paper says",
+        "thaw return without interception",
+        "Stems store carbon, help permafrost by the snow that they catch and harm it by what they absorb",
+        "Not all holds of what the paper says of stems: they store carbon, their catch of snow helps permafrost, what "
+        "they absorb harms it",
         "Stems and permafrost: part of what the paper says is open",
     ),
     Sentence(

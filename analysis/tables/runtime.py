@@ -54,7 +54,7 @@ def make(results) -> pd.DataFrame:
                 {
                     "quantity": f"{what}: {column}",
                     "unit": unit,
-                    "seeds": len(table),
+                    "seeds": table[column].count() or (np.nan if runs else 0),  # those that were timed
                     "paper": theirs,
                     "source": "timing.csv",
                     **row,

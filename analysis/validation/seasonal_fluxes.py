@@ -105,6 +105,6 @@ def draw(runs: dict[str, dict[str, np.ndarray]], towers: dict[str, pd.DataFrame]
         ax.set_title(label)
         ax.set_ylabel(UNITS[name])
     figure.axes[0].legend(loc="upper left")
-    document.headroom(figure.axes[0], 0.15)
+    document.headroom(figure.axes[0], 0.35)
     figure.suptitle("Seasonal courses: mature stands on sampled sites and undisturbed boreal forest towers")
     return document.png(figure)
