@@ -73,7 +73,7 @@ def policy_file(run_or_name) -> Path:
         path = path / POLICY
     elif not path.exists():
         path = ships.get(str(run_or_name), path)
-    if not path.exists():
+    if not path.is_file():
         raise FileNotFoundError(
             f"{run_or_name}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a policy that "
             f"ships ({', '.join(ships) or 'none does yet'})"
