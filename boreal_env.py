@@ -101,6 +101,9 @@ __all__ = [
 ]
 
 
+MOST_ENVS = 1_000_000  # in lockstep: their episodes' records alone are 50 GB
+
+
 def warm_up(num_envs: int = 1, threads: int | None = None) -> None:
     """Compile the physics for `num_envs` stands in lockstep on so many threads, or load it from the disk cache.
 
@@ -232,7 +235,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `timber`: prices and costs, which "timber" needs: "finland", "sweden" or "canada" of `sim/timber_prices.csv`, a
       .csv with the same columns, or a dict of all its items in EUR; the record then has the revenue, the last step's
       info the net present value
-    - `discount_rate`: of that, a year's (0.03)
+    - `discount_rate`: of that, a year's (0.03); without `timber` none is allowed
     - `mechanisms`: switches of the physics, see `sim.MECHANISMS`
     - `constants`: literature constants to override, see `sim/constants.csv`
     - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`, whose order they keep
@@ -367,12 +370,15 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
         if render_mode is not None:
             raise ValueError(f"render_mode {render_mode!r}: the vector environment draws nothing; None is allowed")
         for name, value in (("num_envs", num_envs), ("group_size", group_size)):
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-                raise ValueError(f"{name}: a positive integer is allowed, got {value!r}")
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= MOST_ENVS:
+                raise ValueError(f"{name}: an integer in [1, {MOST_ENVS}] is allowed, got {value!r}")
         if num_envs % group_size:
             raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
         self.num_envs, self.group_size = int(num_envs), int(group_size)
-        self._describe(self.num_envs, kwargs, threads)
+        try:
+            self._describe(self.num_envs, kwargs, threads)
+        except MemoryError as error:
+            raise ValueError(f"num_envs = {num_envs}: fewer are allowed here. {error}") from None
         self.single_observation_space = self._episodes.observation_space
         self.single_action_space = Discrete(NUM_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)

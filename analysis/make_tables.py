@@ -100,7 +100,7 @@ def say_what_was_not_run(what: str, lines: list[str]) -> None:
 
 
 def main(args: Args) -> None:
-    """Write every table; print the main one, and what was left out or is missing."""
+    """Write every table; print the main one's rows that have runs, and what was left out or is missing."""
     results = Results.load(args.quick, args.runs_dir)
     rows = results.rows  # completes left_out
     for line in results.left_out:
@@ -126,7 +126,7 @@ def main(args: Args) -> None:
             write_table(folder / name_of(module), table, text)
             if module is main_results:
                 print(f"{EXPLANATION}\n")
-                print(text[list(main_results.TERMINAL)].to_string(index=False))
+                print(text.loc[(table.seeds > 0).to_numpy(), list(main_results.TERMINAL)].to_string(index=False))
         others = many_objectives.make(results)
         for stem in many_objectives.STEMS:
             for path in set(folder.glob(f"{stem}_*.csv")) - {folder / f"{name}.csv" for name in others}:

@@ -129,7 +129,8 @@ def add(row: dict, root: Path) -> None:
 def main(args: Args) -> None:
     """Check, score, and add."""
     for env_id in args.tasks:
-        ask(env_id, "--tasks")
+        if not ask(env_id, "--tasks").boreal:
+            fail(f"--tasks {env_id}: constant plans, and so a score, are of the boreal environments alone")
     try:
         policy = protocol.load_policy(args.policy, args.script)
         print(f"{policy.name}: {policy.script}, {check(policy, args.policy)}")
@@ -142,7 +143,7 @@ def main(args: Args) -> None:
         for env_id in args.tasks:
             one = comparison(policy, env_id, args.episodes)
             row |= {f"{kind}, {env_id}": one.score(kind) for kind in protocol.POLICIES}
-            scores = ", ".join(f"{one.score(kind):.0f} {kind}" for kind in protocol.POLICIES)
+            scores = ", ".join(f"{one.score(kind):z.0f} {kind}" for kind in protocol.POLICIES)
             gain, best = one.by_weight["greedy"].mean(), one.by_weight["best"].mean()
             print(f"{env_id}: SCORE {scores}; mean gain {gain:.2f} (best constant plans {best:.2f})")
             print(followed(protocol.Task.of(env_id).objectives, one))

@@ -15,7 +15,7 @@ class Args:
     seed: int = 1
     """names the run's folder: the strategy has nothing random, and its episodes are always the same"""
     env_id: str | None = None
-    """boreal-generalist-v0, boreal-balanced-v0 or boreal-site-specific-v0 (None: the mode's)"""
+    """boreal-balanced-v0 or another that `python -m boreal_env` lists (None: the mode's)"""
     mode: Literal["generalist", "site-specific"] | None = None
     """a new site and weather in every episode, or one fixed site (None: the environment's)"""
     site_seed: int | None = None
@@ -49,6 +49,9 @@ def main(script: str, policy) -> None:
     task = protocol.make_task(args)
     if not task.boreal:
         protocol.fail(f"--env-id {args.env_id}: fixed strategies know the boreal environments alone")
+    if task.masks is None or not task.observes_preference:
+        groups = "preference, state and age"
+        protocol.fail(f"--env-id {args.env_id}: fixed strategies look at {groups}; observation_groups must have them")
 
     def action_probabilities(observations, masks, accrued_returns):
         # laid out as for two objectives, whatever their number: a strategy does not look at the weights

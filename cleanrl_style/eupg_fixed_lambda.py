@@ -18,7 +18,7 @@ class Args:
     seed: int = 1
     """seed of the run: agent, sampling and training episodes"""
     env_id: str | None = None
-    """boreal-generalist-v0, -balanced-v0 or -site-specific-v0, or module:id of your own (None: the mode's)"""
+    """boreal-balanced-v0 or another that `python -m boreal_env` lists, or module:id of your own (None: the mode's)"""
     mode: Literal["generalist", "site-specific"] | None = None
     """a new site and weather in every episode, or one fixed site (None: the environment's)"""
     site_seed: int | None = None

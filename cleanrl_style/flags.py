@@ -73,7 +73,7 @@ def policy_file(run_or_name) -> Path:
         path = path / POLICY
     elif not path.exists():
         path = ships.get(str(run_or_name), path)
-    if not path.exists():
+    if not path.is_file():
         raise FileNotFoundError(
             f"{run_or_name}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a policy that "
             f"ships ({', '.join(ships) or 'none does yet'})"
@@ -118,7 +118,8 @@ def message_of(box: str) -> str:
     lines = [line.strip("│ ") for line in box.splitlines()]
     rules = [i for i, line in enumerate(lines) if line.startswith(("───", "---", "╰─"))]
     first = 2 if rules[0] == 1 else 1  # drawn in ASCII, the title has a rule of its own
-    return " ".join(filter(None, lines[first : rules[first - 1]]))
+    message = " ".join(filter(None, lines[first : rules[first - 1]]))
+    return message.partition(" Got errors:")[0]  # of each type that the flag may have
 
 
 def check_limits(args) -> None:

@@ -16,7 +16,7 @@ class Args:
     seed: int = 1
     """seed of the run: candidates and the episodes that they are judged by"""
     env_id: str | None = None
-    """boreal-generalist-v0, -balanced-v0 or another boreal environment (None: the mode's)"""
+    """boreal-balanced-v0 or another that `python -m boreal_env` lists (None: the mode's)"""
     mode: Literal["generalist", "site-specific"] | None = None
     """sites and weathers that are drawn, or one fixed site (None: the environment's)"""
     site_seed: int | None = None
@@ -212,11 +212,11 @@ if __name__ == "__main__":
     episodes_each = args.episodes_each or (1 if task.mode == "site-specific" else 8)
     args.num_envs = args.population * episodes_each
     if args.num_envs > protocol.MAX_ENVS:
-        protocol.fail(f"--population x --episodes-each {args.num_envs}: {protocol.MAX_ENVS} at most are allowed")
+        protocol.fail(f"--population x --episodes-each = {args.num_envs}: at most {protocol.MAX_ENVS} is allowed")
     steps_a_generation = args.num_envs * task.years
     num_generations = args.total_timesteps // steps_a_generation
     if not num_generations:
-        protocol.fail(f"--total-timesteps {args.total_timesteps}: a generation has {steps_a_generation}")
+        protocol.fail(f"--total-timesteps {args.total_timesteps}: at least {steps_a_generation}, a generation")
     update_columns = ("generation", "global_step", "front_size", "gain_hypervolume", "mean_best_gain")
 
     with protocol.Run(args, task, Path(__file__).stem, episodes=task.episode_columns, updates=update_columns) as run:

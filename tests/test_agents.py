@@ -1,5 +1,6 @@
 """A trained policy, loaded again from its run's folder, plays as it did in the run's own evaluation."""
 
+import numpy as np
 import pandas as pd
 import pytest
 import torch
@@ -42,7 +43,25 @@ def test_an_agent_of_another_network_is_refused(tmp_path):
     saved = torch.load(tmp_path / "policy.pt", weights_only=True)
     saved["agent"] = {f"older.{name}": value for name, value in saved["agent"].items()}
     torch.save(saved, tmp_path / "policy.pt")
-    with pytest.raises(ValueError, match="policy.pt: another version of eupg_var_lambda.py trained it"):
+    with pytest.raises(ValueError, match="policy.pt: another version of eupg_var_lambda.py than .* trained it"):
+        protocol.load_policy(tmp_path)
+    with pytest.raises(
+        ValueError, match="ppo_group.pt: another version of ppo_group.py than .*ppo_gated.py trained it"
+    ):
+        protocol.load_policy("ppo_group", script=ROOT / "cleanrl_style" / "ppo_gated.py")
+
+
+def test_returns_of_another_number_of_objectives_are_refused():
+    policy = protocol.load_policy("eupg_var_lambda")
+    with pytest.raises(ValueError, match=r"eupg_var_lambda: accrued_returns \(1, 2\) are allowed, got \(1, 3\)"):
+        policy.act(np.zeros(105), np.ones(25, bool), [0.0, 0.0, 0.0])
+
+
+def test_a_policy_whose_training_went_wrong_is_refused(tmp_path):
+    saved = torch.load(ROOT / "cleanrl_style" / "policies" / "ppo_gated.pt", weights_only=True)
+    next(iter(saved["agent"].values())).fill_(torch.nan)
+    torch.save(saved, tmp_path / "policy.pt")
+    with pytest.raises(ValueError, match="policy.pt: a weight of its network is not finite"):
         protocol.load_policy(tmp_path)
 
 

@@ -120,6 +120,8 @@ def test_step_after_the_end_is_refused():
         ({"preference": NAN}, r"preference: .* got nan"),
         ({"preference": "carbon"}, r"preference: .* got 'carbon'"),
         ({"preference": True}, r"preference: .* got True"),
+        ({"preference": {0.5, 0.7}}, r"preference: a number in \[0, 1\] is allowed, got {0"),
+        ({"preference": iter([0.5, 0.7])}, r"preference: .* got <list_iterator"),
         ({"weight": 0.5}, r"unknown reset option 'weight'; allowed: preference, site"),
         ({"site": {"q11": 2.0}}, r"unknown site parameter 'q11'; did you mean q10"),
         ({"site": {"q10": 50.0}}, r"q10 = 50 is outside .*\[1, 4\]"),

@@ -1,3 +1,4 @@
+import re
 import shutil
 from itertools import product
 from pathlib import Path
@@ -255,6 +256,7 @@ def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):
     assert "not run yet" in (tmp_path / "tables" / "main_results.md").read_text()
     assert "python cleanrl_style/ppo_curriculum.py --seed 1 --vectorization lockstep\n" in out
     assert "python baselines_heuristic/zero_change.py\n" not in out
+    assert re.findall(r"^ *(\w+) +boreal-", out, re.M) == ["zero_change"]  # printed are rows with runs alone
     assert "python analysis/studies/mechanism_pairs.py\n" in out
 
 

@@ -286,3 +286,5 @@ def test_entries_can_be_read_in_their_unit():
     observations = env.reset(seed=1)[0][None]
     assert boreal_env.in_unit(observations, "density")[0] == pytest.approx(300.0, rel=1e-6)
     assert boreal_env.in_unit(observations, "latitude", env.observation_names)[0] == pytest.approx(60.5, rel=1e-6)
+    with pytest.raises(ValueError, match="the observation has no entry 'densities'"):
+        boreal_env.in_unit(observations, "densities")

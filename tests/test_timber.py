@@ -166,7 +166,7 @@ REFUSED = {
     "name": ({"timber": {**PRICES, "road": 1.0}}, "timber: unknown item 'road'"),
     "no prices": ({"objectives": ("timber",)}, "objective 'timber' needs prices: timber=, such as finland"),
     "discount": ({"timber": "finland", "discount_rate": -0.1}, r"discount_rate: a number in \[0, 0.2\]"),
-    "discount without prices": ({"discount_rate": 3}, r"discount_rate: a number in \[0, 0.2\] is allowed, got 3"),
+    "discount without prices": ({"discount_rate": 0.05}, "discount_rate = 0.05: it needs prices, timber=, such as fin"),
 }
 
 

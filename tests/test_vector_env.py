@@ -147,10 +147,11 @@ def test_a_closed_vector_environment_is_refused():
 
 
 BAD_VECTORS = {
-    "no environments": ((0, {}), r"num_envs: a positive integer is allowed, got 0"),
+    "no environments": ((0, {}), r"num_envs: an integer in \[1, 1000000\] is allowed, got 0"),
+    "more than fit": ((10**9, {}), r"num_envs: an integer in \[1, 1000000\] is allowed, got 1000000000"),
     "two and a half": ((2.5, {}), r"num_envs: .* got 2.5"),
     "group of three in four": ((4, {"group_size": 3}), r"group_size = 3: a divisor of num_envs = 4"),
-    "group of none": ((4, {"group_size": 0}), r"group_size: a positive integer is allowed, got 0"),
+    "group of none": ((4, {"group_size": 0}), r"group_size: an integer in \[1, 1000000\] is allowed, got 0"),
     "no threads": ((2, {"threads": 0}), r"threads: a positive integer is allowed, got 0"),
     "drawing": ((4, {"render_mode": "rgb_array"}), r"render_mode 'rgb_array'"),
 }
@@ -186,7 +187,7 @@ def test_vector_reset_refuses(reset, message):
     [
         ([1, 2], r"actions of shape \(2,\): one integer for each of 3 stands"),
         ([1, 2, 25], r"action 25: integers in \[0, 25\)"),
-        ([1.0, 2.0, 3.0], r"actions of type float64"),
+        ([1.5, 2.0, 3.0], r"action 1.5 of type float64: integers in \[0, 25\) are allowed"),
         (3, r"actions of shape \(\)"),
         ([[1, 2, 3]], r"actions of shape \(1, 3\)"),
     ],

@@ -52,6 +52,9 @@ class Policy:
         if accrued_returns is None and self.looks_back:
             raise ValueError(f"{self.name} looks at the returns accrued so far: give accrued_returns")
         accrued = np.zeros((len(masks), 0)) if accrued_returns is None else np.atleast_2d(accrued_returns)
+        wanted = (len(masks), _objectives(self.arguments))
+        if self.looks_back and accrued.shape != wanted:
+            raise ValueError(f"{self.name}: accrued_returns {wanted} are allowed, got {accrued.shape}")
         uniforms = None if generator is None else generator.random(len(masks))
         actions = choose_actions(self.probabilities(observations, masks, accrued), uniforms)
         return int(actions[0]) if np.ndim(observation) == 1 else actions
@@ -80,8 +83,16 @@ def load_policy(run_or_name, script=None) -> Policy:
     try:
         saved = torch.load(path, weights_only=True)
         run = saved.get("run") or json.loads((path.parent / "config.json").read_text(encoding="utf-8"))
-        saved["agent"], saved["arguments"], saved["observation_shape"], run["script"]
-    except (pickle.UnpicklingError, EOFError, RuntimeError, AttributeError, KeyError, json.JSONDecodeError) as error:
+        saved["agent"], saved["arguments"], saved["observation_shape"], run["script"], run["arguments"]
+    except (
+        pickle.UnpicklingError,
+        EOFError,
+        RuntimeError,
+        AttributeError,
+        LookupError,
+        TypeError,
+        ValueError,
+    ) as error:
         raise ValueError(f"{path}: no policy that a script of this project has written") from error
     except FileNotFoundError as error:
         raise FileNotFoundError(f"{path}: config.json of its run has to lie beside it") from error
@@ -90,13 +101,16 @@ def load_policy(run_or_name, script=None) -> Policy:
     lacking = [part for part in ("Agent", "make_policy") if not hasattr(module, part)]
     if lacking:
         raise ValueError(f"{module.__file__}: it has no {' and no '.join(lacking)}, so it trained no policy")
-    agent = module.Agent(SimpleNamespace(single_observation_space=space), **saved["arguments"])
     try:
+        agent = module.Agent(SimpleNamespace(single_observation_space=space), **saved["arguments"])
         # a policy that ships is without its critic, which chooses nothing
         critic = {name: value for name, value in agent.state_dict().items() if name.startswith("critic.")}
         agent.load_state_dict({**critic, **saved["agent"]})
-    except RuntimeError as error:
-        raise ValueError(f"{path}: another version of {run['script']}.py trained it, of another network") from error
+    except (RuntimeError, TypeError) as error:
+        trained_it = f"another version of {run['script']}.py than {module.__file__} trained it"
+        raise ValueError(f"{path}: {trained_it}, of another network") from error
+    if not all(weights.isfinite().all() for weights in agent.state_dict().values()):
+        raise ValueError(f"{path}: a weight of its network is not finite, so its training went wrong")
     probabilities, (size,) = module.make_policy(agent), space.shape
     unknown = np.full((1, _objectives(run["arguments"])), np.nan)
     looks_back = bool(np.isnan(probabilities(np.zeros((1, size), np.float32), np.ones((1, 25), bool), unknown)).any())

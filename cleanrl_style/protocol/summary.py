@@ -54,10 +54,10 @@ def print_score(objectives, comparison: Comparison) -> None:
         chosen = np.ones(len(table), dtype=bool)
 
     def row(name, values, words=""):
-        return f"{name:>{label}}" + "".join(f"{value:>{WIDTH}.2f}" for value in values) + words
+        return f"{name:>{label}}" + "".join(f"{value:>z{WIDTH}.2f}" for value in values) + words  # z: no -0.00
 
     episodes = comparison.evaluation.seed.nunique()
-    scores = {name: f"{comparison.score(name):.0f}" for name in shown}
+    scores = {name: f"{comparison.score(name):z.0f}" for name in shown}
     policies = ", ".join(f"{scores[policy]} {policy}" for policy in sorted(POLICIES, key=lambda name: name != PRIMARY))
     print(f"\nSCORE {policies}: 0 is to do nothing, 100 the best that one can do without looking")
     what = "reward" if comparison.utility.ideal is None else "Chebyshev's utility"
@@ -103,7 +103,7 @@ def followed(objectives, comparison: Comparison) -> str:
     what = f"{objectives[0]} weight {first:g} to {last:g}" if len(objectives) == 2 else "own weight lowest to highest"
     ours, best = (change(comparison.gains[name]) for name in (PRIMARY, "best"))
     changes = (
-        f"{objective} {one:+.2f} (best plans {other:+.2f})"
+        f"{objective} {one:+z.2f} (best plans {other:+z.2f})"
         for objective, one, other in zip(objectives, ours, best, strict=True)
     )
     return f"Following the preference, {what}: {', '.join(changes)}"

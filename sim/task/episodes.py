@@ -24,7 +24,7 @@ from sim.task.objectives import (
 )
 from sim.task.observation import Moment, Table, observation_rows
 from sim.task.preference import check_weights, draw_weights, shown
-from sim.task.timber import TIMBER_COLUMNS, Timber, check_discount_rate, countries
+from sim.task.timber import TIMBER_COLUMNS, Timber, countries
 
 #: A new site each episode, whose parameters are observed; or a fixed one.
 MODES = ("generalist", "site-specific")
@@ -58,7 +58,7 @@ class Episodes:
         balanced=False,
         objectives=PAPER_OBJECTIVES,
         timber=None,
-        discount_rate=0.03,
+        discount_rate=None,
         mechanisms=None,
         constants=None,
         weather="paper",
@@ -100,7 +100,8 @@ class Episodes:
         self.own_objectives = [objective for objective in objectives if isinstance(objective, Objective)]
         if timber is None and TIMBER in objectives:
             raise ValueError(f"objective 'timber' needs prices: timber=, such as {', '.join(countries())}")
-        check_discount_rate(discount_rate)
+        if timber is None and discount_rate is not None:
+            raise ValueError(f"discount_rate = {discount_rate!r}: it needs prices, timber=, such as {countries()[0]}")
         self.timber = None if timber is None else Timber(timber, discount_rate)
         self.history_names = (
             *HISTORY_NAMES,

@@ -279,6 +279,8 @@ class Reader:
 
     def __init__(self, wanted: Sequence[str], names: Sequence[str] = OBSERVATION_NAMES):
         rows = {row.name: row for row in ROWS}
+        for name in set(wanted) - set(names):
+            raise ValueError(f"the observation has no entry {name!r}; OBSERVATION_NAMES of boreal_env has their names")
         self.columns = [list(names).index(name) for name in wanted]
         self.shift, self.scale = np.array([(rows[name].shift, rows[name].scale) for name in wanted]).T
 

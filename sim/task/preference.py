@@ -4,6 +4,8 @@ Two objectives need one number, the weight of the first, and outside of this pac
 options, in the observation and in the last step's info.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 ROUND_OFF = 1e-6  # by which given weights may miss the sum of 1
@@ -66,4 +68,4 @@ def _is_number(value) -> bool:
 
 
 def _is_sequence(value) -> bool:
-    return np.iterable(value) and not isinstance(value, str)
+    return np.iterable(value) and not isinstance(value, (str, dict, set, Iterator))

@@ -45,10 +45,10 @@ TIMBER_COLUMNS = ("timber_m3_ha", "net_revenue_eur_ha", "discounted_revenue_eur_
 
 class Timber:
     """Prices and a discount rate. timber : a country of the table, a path to a .csv of one country with the same
-    columns, or a dict of `ITEMS` in EUR; discount_rate : a year's. Raises ValueError naming what is wrong."""
+    columns, or a dict of `ITEMS` in EUR; discount_rate : a year's, or None. Raises ValueError naming what is wrong."""
 
     def __init__(self, timber, discount_rate):
-        self.discount_rate = check_discount_rate(discount_rate)
+        self.discount_rate = 0.03 if discount_rate is None else check_discount_rate(discount_rate)
         self.prices = read_prices(timber)
 
     def columns(self, record: dict[str, np.ndarray], year) -> dict[str, np.ndarray]:
