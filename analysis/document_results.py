@@ -81,14 +81,20 @@ def line(title: str, replicates: list, published: float = np.nan, trained: bool 
     """A row of the table: interquartile means over training seeds with 95 % intervals, and the paper's return."""
     shown = [*RETURNS, "gain_hypervolume"]
     table = pd.DataFrame([numbers(one.evaluation, one.gains) for one in replicates], columns=shown)
-    values, cells = over_seeds(table) | main_results.scores(replicates), []
-    for name, decimals in COLUMNS.items():
-        value, low, high = (values.get(f"{name}{part}", np.nan) for part in ("", "_low", "_high"))
-        interval = "" if np.isnan(low) else f" [{low:.{decimals}f}, {high:.{decimals}f}]"
-        cells.append("" if np.isnan(value) else f"{value:.{decimals}f}{interval}")
+    cells = cells_of(over_seeds(table) | main_results.scores(replicates), COLUMNS)
     cells.append("" if np.isnan(published) else f"{published:.2f}")
     seeds = str(len(table) or "not run yet") if trained else ""
     return f"| {title} | {seeds} | " + " | ".join(cells) + " |\n"
+
+
+def cells_of(values: dict, columns: dict[str, int]) -> list[str]:
+    """Values with their intervals, in so many decimals; columns : their names, and the decimals."""
+    cells = []
+    for name, decimals in columns.items():
+        value, low, high = (values.get(f"{name}{part}", np.nan) for part in ("", "_low", "_high"))
+        interval = "" if np.isnan(low) else f" [{low:.{decimals}f}, {high:.{decimals}f}]"
+        cells.append("" if np.isnan(value) else f"{value:.{decimals}f}{interval}")
+    return cells
 
 
 def not_run(*names: str) -> str:
@@ -161,6 +167,21 @@ def plans(results: Results, environment: str) -> list[tuple[str, list]]:
         for name, (title, _) in main_results.CONSTANT_PLANS.items()
         if found[name, environment, "default"]
     ]
+
+
+def other_worlds(results: Results) -> str:
+    """Score and gain of what was trained with more objectives or in another climate."""
+    text = "| environment | method | seeds | score, greedy | score, sampled | gain |\n" + "|---" * 6 + "|\n"
+    columns = {name: COLUMNS[name] for name in ("score_greedy", "score_sampled", "gain_scalarized")}
+    lacking = list(experiments.OTHER_WORLDS)
+    for (script, env_id, setting), replicates in results.rows.items():
+        if env_id in experiments.OTHER_WORLDS and replicates:
+            title = ", ".join(filter(None, (methods.title(script), flags(setting))))
+            cells = cells_of(main_results.scores(replicates), columns)
+            text += f"| `{env_id}` | {title} | {len(replicates)} | " + " | ".join(cells) + " |\n"
+            lacking = [name for name in lacking if name != env_id]
+    names = ", ".join(f"`{name}`" for name in lacking)
+    return text + (f"\n{names}. {not_run('worlds')}" if lacking else "")
 
 
 def distances(results: Results) -> str:
@@ -331,6 +352,7 @@ FIGURES = {
 OF_ALL = {"all": GENERALIST, "balanced": BALANCED}
 TABLES = {
     "distances": distances,
+    "other_worlds": other_worlds,
     "single_sites": sites_alone,
     "six_rows": main_points.six_rows,
     "in_words": main_points.in_words,
