@@ -248,10 +248,11 @@ def other_libraries(results: Results) -> str:
         hours = np.median([sum(runtime.hours(run)[name] for name in ("training", "evaluation")) for run in runs])
         scores = main_results.scores(replicates)
         shown = [scores["score_greedy"], scores["score_sampled"], scores.get("gain_scalarized", np.nan)]
+        shown += [hours, cost.peak_memory_mb / 1000]
         cells = [", ".join(filter(None, (methods.title(script), flags(setting)))), f"`{env_id}`", str(len(replicates))]
-        cells += ["" if np.isnan(x) else f"{x:.{digits}f}" for x, digits in zip(shown, (0, 0, 2), strict=True)]
-        cells += [f"{hours:.1f}", f"{cost.peak_memory_mb / 1000:.1f}", f"{cost.steps:,.0f}"]
-        text += "| " + " | ".join([*cells, f"{cost.own_evaluation_steps:,.0f}"]) + " |\n"
+        cells += ["" if np.isnan(x) else f"{x:.{digits}f}" for x, digits in zip(shown, (0, 0, 2, 1, 1), strict=True)]
+        cells += [f"{cost.steps:,.0f}", f"{cost.own_evaluation_steps:,.0f}"]
+        text += "| " + " | ".join(cells) + " |\n"
     return text if rows else not_run("outside")
 
 
