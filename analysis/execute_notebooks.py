@@ -14,6 +14,7 @@ import nbformat
 from nbclient import NotebookClient
 
 from cleanrl_style import protocol
+from sim.block import KERNELS
 
 FOLDER = Path(__file__).parents[1] / "docs" / "notebooks"
 LANGUAGE = {"name": "python"}
@@ -53,7 +54,7 @@ def shown(notebook: nbformat.NotebookNode) -> list[str]:
 
 def main(args: Args) -> None:
     """Run them; write them, or compare."""
-    protocol.compile_physics({1, 4})  # so that no notebook shows that it compiles
+    protocol.compile_physics(KERNELS)  # so that no notebook shows that it compiles
     stale = []
     for path in args.notebooks:
         new = executed(path)
