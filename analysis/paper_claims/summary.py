@@ -84,8 +84,8 @@ SENTENCES = (
         mechanisms.stems,
         "thaw return without interception",
         "Stems store carbon, help permafrost by the snow that they catch and harm it by what they absorb",
-        "Not all holds of what the paper says of stems: they store carbon, their catch of snow helps permafrost, what "
-        "they absorb harms it",
+        "The paper says that stems store carbon, help permafrost by the snow that they catch and harm it by what they "
+        "absorb; not all of it holds here",
         "Stems and permafrost: part of what the paper says is open",
     ),
     Sentence(
