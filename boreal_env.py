@@ -24,7 +24,7 @@ if not Path(__file__).with_name("sim").samefile(_found := getattr(sim, "__path__
 
 from sim.block import kernel, lanes_for
 from sim.draws import restored_generator
-from sim.management import NUM_ACTIONS
+from sim.management import NUM_ACTIONS, as_array
 from sim.parameters import check_name, check_overrides, check_seed
 from sim.stands import available_cores
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
@@ -290,7 +290,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
 
     def step(self, action):
         """One year under `action`, an integer in [0, 25)."""
-        values = np.asarray(action)
+        values = as_array(action)
         if values.size != 1:
             raise ValueError(f"action {action!r}: one integer in [0, {NUM_ACTIONS}) is allowed")
         reward = self._episodes.advance(values.reshape(1))[0]
@@ -440,10 +440,12 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
         return self._episodes.weights.copy()
 
     def stable_baselines3(self):
-        """These stands as a VecEnv of Stable-Baselines3, with masks for sb3-contrib: `pip install "borearl[sb3]"`.
+        """These stands as a VecEnv of Stable-Baselines3, with masks for sb3-contrib: `pip install -e ".[sb3]"`.
 
         Each stand's reward is scalarised by its own preference, which it observes.
         """
+        if importlib.util.find_spec("stable_baselines3") is None:
+            raise gym.error.DependencyNotInstalled('stable_baselines3(): pip install -e ".[sb3]"')
         from sim.task.stable_baselines import LockstepVecEnv
 
         return LockstepVecEnv(self)

@@ -96,14 +96,20 @@ def check(policy: protocol.Policy, folder: Path) -> str:
     return f"plays its evaluation again, {len(again)} episodes"
 
 
-def comparison(policy: protocol.Policy, env_id: str, episodes: int) -> score.Comparison:
-    """A policy's evaluation in an environment, beside the constant plans there."""
+def task_of(policy: protocol.Policy, env_id: str) -> protocol.Task:
+    """An environment as the policy observes it; ValueError if it has another observation."""
     observation_groups = policy.task().env_kwargs.get("observation_groups")
     kwargs = {} if observation_groups is None else {"observation_groups": observation_groups}
     task = protocol.Task.of(env_id, **kwargs)
     size = task.make().observation_space.shape[0]
     if size != policy.size:
-        raise ValueError(f"{policy.name} observes {policy.size} entries, {env_id} has {size}: --tasks names others")
+        trained_on = f"{policy.name}, trained on {policy.env_id}, observes {policy.size} entries"
+        raise ValueError(f"{trained_on}; {env_id} has {size}: --tasks names others")
+    return task
+
+
+def comparison(policy: protocol.Policy, task: protocol.Task, episodes: int) -> score.Comparison:
+    """A policy's evaluation in an environment, beside the constant plans there."""
     weights = fronts.evaluation_weights(task.num_objectives)
     evaluation, _ = protocol.evaluate(task, policy.probabilities, weights, episodes)
     plans = reference.reference_returns(task, evaluation.seed.drop_duplicates().tolist())
@@ -133,6 +139,7 @@ def main(args: Args) -> None:
             fail(f"--tasks {env_id}: constant plans, and so a score, are of the boreal environments alone")
     try:
         policy = protocol.load_policy(args.policy, args.script)
+        tasks = [task_of(policy, env_id) for env_id in args.tasks]  # refused before anything is played
         print(f"{policy.name}: {policy.script}, {check(policy, args.policy)}")
         row = {
             "name": args.name or policy.script,
@@ -140,13 +147,13 @@ def main(args: Args) -> None:
             "trained on": policy.env_id,
             "steps": policy.arguments.get("total_timesteps"),
         }
-        for env_id in args.tasks:
-            one = comparison(policy, env_id, args.episodes)
+        for env_id, task in zip(args.tasks, tasks, strict=True):
+            one = comparison(policy, task, args.episodes)
             row |= {f"{kind}, {env_id}": one.score(kind) for kind in protocol.POLICIES}
             scores = ", ".join(f"{one.score(kind):z.0f} {kind}" for kind in protocol.POLICIES)
             gain, best = one.by_weight["greedy"].mean(), one.by_weight["best"].mean()
             print(f"{env_id}: SCORE {scores}; mean gain {gain:.2f} (best constant plans {best:.2f})")
-            print(followed(protocol.Task.of(env_id).objectives, one))
+            print(followed(task.objectives, one))
         if args.add:
             add(row, args.root)
             print(f"wrote {args.root / TABLE} and {args.root / PAGE}")

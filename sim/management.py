@@ -5,6 +5,8 @@ records it; the action mask is where it is the whole (`sim.task.actions`); the p
 the share that it leaves undone, `missed_share` (`sim.task.objectives`).
 """
 
+import reprlib
+
 import numpy as np
 
 from sim.assortment import standing_wood
@@ -43,10 +45,19 @@ def decode(actions) -> tuple[np.ndarray, np.ndarray]:
     return _CHANGES[density], _MIXES[mix]
 
 
+def as_array(actions) -> np.ndarray:
+    """Actions as an array. Raises ValueError for rows of unequal length."""
+    try:
+        return np.asarray(actions)
+    except ValueError:
+        what = f"integers in [0, {NUM_ACTIONS}) are allowed"
+        raise ValueError(f"actions {reprlib.repr(actions)}: rows of unequal length; {what}") from None
+
+
 def check_actions(actions, number, of="stands") -> np.ndarray:
     """Actions as integers, shape (number,), one for each of so many stands or years. Raises ValueError naming the first
     that is not in [0, 25)."""
-    values = np.asarray(actions)
+    values = as_array(actions)
     if values.shape != (number,):
         raise ValueError(f"actions of shape {values.shape}: one integer for each of {number} {of} is allowed")
     if not np.issubdtype(values.dtype, np.integer):

@@ -3,11 +3,12 @@
 import numpy as np
 import pandas as pd
 
+from sim import stands
 from sim.draws import episode_seeds
 from sim.io.check import check_forcing, interval_of
 from sim.io.dataset import import_xarray, to_dataset
 from sim.jit import uncompiled
-from sim.management import NOTHING, check_actions, decode
+from sim.management import NOTHING, as_array, check_actions, decode
 from sim.parameters import SITE_PARAMETERS, check_mapping, middle_site
 from sim.physical_constants import FREEZING_POINT_K
 from sim.scenario import FIRST_YEAR
@@ -108,10 +109,15 @@ def simulate(
     if not isinstance(hold_stand, (bool, np.bool_)):
         raise ValueError(f"hold_stand: True or False is allowed, got {hold_stand!r}")
     interval = DEFAULT_MINUTES if forcing is None else interval_of(forcing)
+    if interval > stands.LONGEST_STEP_MINUTES:
+        raise ValueError(
+            f"forcing: it comes every {interval} minutes; at most {stands.LONGEST_STEP_MINUTES} are allowed"
+        )
     if time_step_minutes is None:
         time_step_minutes = max(DEFAULT_MINUTES, interval)
     years = _check_years(years, forcing, interval)
-    per_year = np.full(years, NOTHING if actions is None else actions) if np.ndim(actions) == 0 else np.asarray(actions)
+    given = as_array(NOTHING if actions is None else actions)
+    per_year = np.full(years, given) if given.ndim == 0 else given
     check_actions(per_year, years, "years")
     overrides, boundary = _with_boundary(_of_forcing(site, forcing), boundary)
     if hold_stand:

@@ -19,7 +19,7 @@ from sim.deadwood import deadwood_in_balance
 from sim.demography import AGES, first_ages
 from sim.draws import Seeds, draw_slice, draw_year, restored_generator
 from sim.management import NOTHING, check_actions, first_cut_age
-from sim.parameters import check_constants, check_mechanisms, check_name, check_weather
+from sim.parameters import check_constants, check_keys, check_mechanisms, check_name, check_weather
 from sim.scenario import CO2, WITHOUT_SCENARIO, check_scenario
 from sim.spin_up import (
     BOUNDARIES,
@@ -48,6 +48,7 @@ from sim.state import (
     STATE_SIZE,
 )
 
+SAVED = ("parameters", "state", "record", "years", "seeds", "weather", "disturbance")  # that the future depends on
 LONGEST_STEP_MINUTES = 120  # beyond, the air is up to 2 K too warm
 
 
@@ -285,8 +286,13 @@ class Stands:
 
     def set_state(self, state: dict) -> None:
         """Continue from a `get_state` of as many stands."""
+        check_keys("state of stands", state, SAVED)
         if len(state["years"]) != self.number:
             raise ValueError(f"state of {len(state['years'])} stands given to {self.number}")
+        for name in ("parameters", "state", "record"):
+            there, here = np.shape(state[name]), getattr(self, name).shape
+            if there != here:
+                raise ValueError(f"state of stands: {name} of shape {there}, {here} is allowed; of another version?")
         self.parameters, self.state = state["parameters"].copy(), state["state"].copy()
         self.record, self.years = state["record"].copy(), state["years"].copy()
         self.seeds = list(state["seeds"])

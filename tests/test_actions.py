@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from playing import ENTRIES, INDEX, NAN, THREE, TIMBER, WITHOUT_SITE, play, quick, quick_vector
 
 import boreal_env
+import sim
 from sim.jit import uncompiled
-from sim.management import feasible_change, missed_share
+from sim.management import check_actions, feasible_change, missed_share
 
 
 def test_masks_of_worked_cases():
@@ -32,6 +33,16 @@ def test_masks_of_worked_cases():
     assert mask(1980.0, 1000.0) == [True, True, True, False, False]
     assert mask(1900.0, 0.0) == [False, False, True, True, False]  # planting has to end below 2000
     assert mask(600.0, 300.0, harvest_min_class="old") == [False, False, True, True, True]
+
+
+def test_actions_in_rows_of_unequal_length_are_refused():
+    message = r"^actions \[\[1\], \[2, 3\]\]: rows of unequal length; integers in \[0, 25\) are allowed$"
+    with pytest.raises(ValueError, match=message):
+        quick().step([[1], [2, 3]])
+    with pytest.raises(ValueError, match=message):
+        check_actions([[1], [2, 3]], 2)
+    with pytest.raises(ValueError, match=message):
+        sim.simulate(actions=[[1], [2, 3]], years=2)
 
 
 @pytest.mark.parametrize("youngest", ["young", "mature", "old"])

@@ -21,6 +21,7 @@ def test_known_places_are_land_and_sea():
     assert boreal_map.on_land(longitude, latitude).tolist() == land.tolist()
 
 
+@pytest.mark.slow
 def test_the_map_of_a_strategy(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     args = boreal_map.Args("plus_100", preference=0.25, quick=True)

@@ -111,6 +111,12 @@ def test_a_run_is_checked_and_scored(run, capsys):
     assert "plays its evaluation again" in out and "boreal-site-specific-v0: SCORE" in out
 
 
+def test_a_policy_of_another_observation_is_refused_before_it_plays(run, monkeypatch):
+    monkeypatch.setattr(protocol, "evaluate", None)
+    with pytest.raises(SystemExit, match="observes 43 entries; boreal-balanced-v0 has 105: --tasks"):
+        score_policy.main(score_policy.Args(run, tasks=("boreal-site-specific-v0", "boreal-balanced-v0")))
+
+
 def test_a_policy_that_does_not_play_its_evaluation_is_refused(run, tmp_path):
     for name in ("config.json", "policy.pt"):
         (tmp_path / name).write_bytes((run / name).read_bytes())

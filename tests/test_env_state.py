@@ -49,11 +49,28 @@ def test_the_state_of_another_environment_is_refused():
         quick(years=4).set_state(saved.get_state())
 
 
-@pytest.mark.parametrize(("state", "got"), [({}, r"\[\]"), (None, "NoneType"), ({"generator": 1}, r"\['generator'\]")])
-def test_what_is_no_state_is_refused(state, got):
+@pytest.mark.parametrize(
+    ("state", "wrong"),
+    [({}, "missing: episodes, generators?"), (None, "got NoneType"), ({"generator": 1}, "missing: episodes")],
+)
+def test_what_is_no_state_is_refused(state, wrong):
     for env in (quick(), quick_vector(2)):
-        with pytest.raises(ValueError, match=rf"state: a dict of episodes, generators?.* got {got}"):
+        with pytest.raises(ValueError, match=rf"^state: a dict of episodes, .* is allowed; {wrong}"):
             env.set_state(state)
+
+
+def test_half_a_state_is_refused_by_what_it_lacks():
+    for env in (quick(), quick_vector(2)):
+        saved = env.get_state()
+        for part, where in ((saved["episodes"], "episodes"), (saved["episodes"]["stands"], "stands")):
+            for name in list(part):
+                value = part.pop(name)
+                with pytest.raises(ValueError, match=rf"^state of {where}: a dict of .* is allowed; missing: {name}$"):
+                    env.set_state(saved)
+                part[name] = value
+        saved["episodes"]["stands"]["record"] = saved["episodes"]["stands"]["record"][:, 1:]
+        with pytest.raises(ValueError, match=r"^state of stands: record of shape \(\d, \d+\), \(\d, \d+\) is allowed"):
+            env.set_state(saved)
 
 
 def test_the_state_of_a_vector_environment_is_not_that_of_one():

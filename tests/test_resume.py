@@ -15,6 +15,8 @@ import pytest
 import torch
 from scripts import ROOT, run_script
 
+from cleanrl_style.protocol import training_envs
+
 TOY = ("--env-id", "resumable_toy:resumable-toy-v0", "--total-timesteps", 1500, "--num-envs", 3, "--eval-episodes", 2)
 BOREAL_ASYNC = ("--total-timesteps", 1000, "--num-envs", 4, "--eval-episodes", 1)
 BOREAL = ("--total-timesteps", 1600, "--num-envs", 16, "--eval-episodes", 1, "--vectorization", "lockstep")
@@ -95,14 +97,12 @@ def assert_same_bytes(folder, other):
     [
         pytest.param("ppo_curriculum", TOY, "any", marks=pytest.mark.slow),
         pytest.param("ppo_curriculum", BOREAL_ASYNC, "checkpoint", marks=pytest.mark.slow),
-        pytest.param("ppo_gated", BOREAL, "checkpoint", marks=pytest.mark.slow),
         pytest.param("eupg_var_lambda", BOREAL, "any", marks=pytest.mark.slow),
         ("eupg_fixed_lambda", TOY, "any checkpoint"),
     ],
     ids=[
         "ppo_curriculum-toy",
         "ppo_curriculum-async",
-        "ppo_gated-lockstep",
         "eupg_var_lambda-lockstep",
         "eupg_fixed_lambda-toy",
     ],
@@ -206,6 +206,15 @@ def test_a_checkpoint_of_another_network_is_refused(interrupted, tmp_path, part)
     torch.save(state, folder / "checkpoint.pt")
     with pytest.raises(SystemExit, match=f"checkpoint.pt: its {part} does not fit that of this ppo_gated; --overwrite"):
         resume(folder)
+
+
+def test_a_checkpoint_of_another_environment_is_refused(interrupted, tmp_path, monkeypatch):
+    def refuse(envs, states):
+        raise ValueError("state of 3 stands given to 4")
+
+    monkeypatch.setattr(training_envs, "set_states", refuse)
+    with pytest.raises(SystemExit, match=r"its environments are not those of this ppo_gated \(state of 3 .*; --over"):
+        resume(copy(interrupted, tmp_path))
 
 
 def test_a_table_shorter_than_its_checkpoint_is_refused(interrupted, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from scripts import ROOT
 
 import sim
-from sim import spin_up
+from sim import spin_up, stands
 from sim.demography import AGES
 from sim.parameters import CONSTANTS, SITE_PARAMETERS, check_constants, check_mechanisms, mean_annual_temperature
 from sim.simulate import HELD_STAND, check_forcing
@@ -490,6 +490,12 @@ FORCINGS = {
 def test_forcing_is_refused(make, message):
     with pytest.raises(ValueError, match=message):
         simulate(forcing=make())
+
+
+def test_a_forcing_of_three_hours_is_named_for_what_it_is(monkeypatch):
+    monkeypatch.setattr(stands, "LONGEST_STEP_MINUTES", 120)
+    with pytest.raises(ValueError, match="^forcing: it comes every 180 minutes; at most 120 are allowed$"):
+        simulate(forcing=observed(minutes=180))
 
 
 @pytest.mark.parametrize("minutes", [120, 360])

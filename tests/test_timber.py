@@ -138,6 +138,7 @@ def test_a_table_of_ones_own(tmp_path):
         ("per_eur", "0", "sawlog_conifer has the per_eur 0; a positive number"),
         ("year", "", "line 2: sawlog_conifer has the year ''; one such as 2023 is allowed"),
         ("currency", "", "line 2: sawlog_conifer has the currency ''; one such as EUR is allowed"),
+        ("currency", "EUR", "line 2: sawlog_conifer is in EUR and has the per_eur 10.63; 1 is allowed"),
         ("item", "sawlogs", "unknown item 'sawlogs'; allowed are sawlog_conifer"),
     ):
         write([{**rows[0], column: value}, *rows[1:]])

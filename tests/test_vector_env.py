@@ -1,5 +1,7 @@
 """Many stands in lockstep: the same as one by one, groups, resets of a part, refusals."""
 
+import importlib.util
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -9,6 +11,12 @@ from playing import INDEX, QUICK, SITE, assert_same, loop, of_environment, quick
 import boreal_env
 import sim
 from boreal_env import BorealEnv, BorealVectorEnv
+
+
+def test_stable_baselines3_is_named_where_it_is_missing(monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(gym.error.DependencyNotInstalled, match=r'^stable_baselines3\(\): pip install -e "\.\[sb3\]"$'):
+        quick_vector(2).stable_baselines3()
 
 
 @pytest.mark.parametrize("mode", boreal_env.MODES)

@@ -256,13 +256,16 @@ class Run:
         if self.checkpoint:
             import torch
 
+            path = self.folder / "checkpoint.pt"
             for name, part in parts.items():
                 try:
                     part.load_state_dict(self.checkpoint[name])
                 except (KeyError, ValueError, RuntimeError):
-                    path = self.folder / "checkpoint.pt"
                     fail(f"{path}: its {name} does not fit that of this {self.script}; --overwrite starts over")
-            training_envs.set_states(self.envs, self.checkpoint["envs"])
+            try:
+                training_envs.set_states(self.envs, self.checkpoint["envs"])
+            except ValueError as error:
+                fail(f"{path}: its environments are not those of this {self.script} ({error}); --overwrite starts over")
             python_state, numpy_state, torch_state = self.checkpoint["random_states"]
             random.setstate(python_state)
             np.random.set_state(numpy_state)

@@ -38,8 +38,10 @@ def evaluation_seeds(task: Task, episodes: int, split: str = "test") -> list[int
     """What the environments of an evaluation are reset with, a seed an episode.
 
     The first published sites where the task draws sites, else new weathers of its own site. Raises ValueError for an
-    unknown split, and for more episodes than a split has sites.
+    unknown split, for no episode, and for more than a split has sites.
     """
+    if episodes < 1:
+        raise ValueError(f"{episodes} episodes: 1 or more are allowed")
     if split not in SPLITS:
         raise ValueError(f"split {split!r}: allowed are {', '.join((*SPLITS, *task.shifts))}")
     if not task.draws_sites:

@@ -184,6 +184,7 @@ def _draw_gains(figure, ax, objectives, comparison: Comparison) -> None:
     ax.annotate("doing nothing (0)", (0.02, 0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8)
     label = f"{objectives[0]} weight" if len(objectives) == 2 else "weight (number in the table)"
     ax.set(xlabel=label, ylabel="scalarized gain", title="evaluation, gain over doing nothing")
+    ax.xaxis.get_major_locator().set_params(integer=len(objectives) != 2)
     ax.legend(fontsize=7)
 
 

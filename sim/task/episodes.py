@@ -8,7 +8,7 @@ from gymnasium.spaces import Box
 
 import sim
 from sim.management import check_actions
-from sim.parameters import check_name, check_seed
+from sim.parameters import check_keys, check_name, check_seed
 from sim.spin_up import BOUNDARY, check_initial_ranges, middle_stocks
 from sim.task.actions import MaskFunction, mask_function, unchanged
 from sim.task.objectives import (
@@ -33,6 +33,7 @@ MODES = ("generalist", "site-specific")
 BALANCED_WORLD = {"boundary": "balanced", "soil_carbon": "balanced", "weather": "observed"}
 #: Length of an episode.
 DEFAULT_YEARS = 50
+SAVED = ("weights", "site_seeds", "episode_seeds", "year", "running", "history", "observed")  # besides the stands'
 
 
 class Episodes:
@@ -271,12 +272,12 @@ class Episodes:
 
     def get_state(self) -> dict:
         """All that the future depends on."""
-        names = ("weights", "site_seeds", "episode_seeds", "year", "running", "history", "observed")
-        state = {name: getattr(self, name).copy() for name in names}
+        state = {name: getattr(self, name).copy() for name in SAVED}
         return {"mode": self.mode, "stands": self.stands.get_state(), **state}
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
+        check_keys("state of episodes", state, ("mode", "stands", *SAVED))
         there, here = (
             (mode, *history.shape, weights.shape[1])
             for mode, history, weights in (
@@ -288,9 +289,8 @@ class Episodes:
             what = "mode, episodes, years, columns of the record, objectives"
             raise ValueError(f"state of ({what}) {there} given to {here}")
         self.stands.set_state(state["stands"])
-        for name, value in state.items():
-            if name not in ("mode", "stands"):
-                setattr(self, name, value.copy())
+        for name in SAVED:
+            setattr(self, name, state[name].copy())
 
 
 def check_groups(wanted, groups: Sequence[str]) -> tuple[str, ...]:
@@ -320,13 +320,11 @@ def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict
 
 def check_saved(state: dict, kind: str) -> None:
     """A dict that `get_state` of the same kind of environment, "single" or "vector", gave."""
-    keys = {"single": ["episodes", "generator"], "vector": ["episodes", "generators"]}
-    got = sorted(state, key=str) if isinstance(state, dict) else type(state).__name__
+    keys = {"single": ("episodes", "generator"), "vector": ("episodes", "generators")}
     for other in keys:
-        if got == keys[other] != keys[kind]:
+        if other != kind and isinstance(state, dict) and set(state) == set(keys[other]):
             raise ValueError(f"state of a {other} environment given to a {kind} one")
-    if got != keys[kind]:
-        raise ValueError(f"state: a dict of {', '.join(keys[kind])} from get_state is allowed, got {got}")
+    check_keys("state", state, keys[kind])
 
 
 ARGUMENTS = tuple(name for name in inspect.signature(Episodes).parameters if name not in ("number", "threads"))

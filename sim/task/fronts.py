@@ -15,7 +15,7 @@ import numpy as np
 from sim.task.actions import NO_CHANGE
 
 FOLDER = "best_plans"
-FREE = ("observation_groups", "record_years", "fixed_preference")  # arguments that no return hangs on
+FREE = ("observation_groups", "record_years", "record_steps", "fixed_preference")  # arguments that no return hangs on
 
 
 def shipped(env_id: str):

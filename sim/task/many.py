@@ -27,7 +27,7 @@ import pandas as pd
 import sim
 from sim.block import is_compiled, lanes_for
 from sim.executor import HERE, each
-from sim.management import NUM_ACTIONS, check_actions
+from sim.management import NUM_ACTIONS, as_array, check_actions
 from sim.parameters import check_name, check_seed
 from sim.spin_up import BOUNDARY, CLASS_NAMES, INITIAL_LIMITS, LARGEST_STEM_KGC, check_initial
 from sim.stands import available_cores
@@ -391,7 +391,7 @@ def check_choice(actions, label: str | None, sites: int, one: Episodes) -> tuple
         done = digest(choose(actions, *probes(one)).astype(np.int64))
         name = getattr(actions, "__qualname__", type(actions).__qualname__)
         return actions, label or f"{getattr(actions, '__module__', '')}.{name} {done}"
-    given = np.asarray(actions)
+    given = as_array(actions)
     if given.shape not in ((), (one.years,), (sites, one.years)):
         raise ValueError(
             f"actions of shape {given.shape}: an action, a plan of shape ({one.years},) or ({sites}, {one.years}), "

@@ -162,6 +162,8 @@ def in_eur(where: str, row: dict) -> float:
         raise ValueError(f"{where}: {item} has the value {row['value']}; a finite number, not negative, is allowed")
     if not 0.0 < numbers["per_eur"] < np.inf:
         raise ValueError(f"{where}: {item} has the per_eur {row['per_eur']}; a positive number is allowed")
+    if row["currency"] == "EUR" and numbers["per_eur"] != 1.0:
+        raise ValueError(f"{where}: {item} is in EUR and has the per_eur {row['per_eur']}; 1 is allowed")
     return numbers["value"] * UNITS[unit] / numbers["per_eur"]
 
 
