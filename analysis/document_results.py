@@ -20,7 +20,7 @@ from analysis import excerpts, experiments, generalisation, main_points, methods
 from analysis.experiments import BALANCED, GENERALIST
 from analysis.figures import learning_asymmetry, learning_curves, learning_difficulty
 from analysis.results import Results
-from analysis.tables import distance_to_best, main_results, runtime, single_sites
+from analysis.tables import best_known, main_results, runtime, single_sites
 from analysis.tables import learning_difficulty as difficulty_table
 from analysis.tables.common import has_numbers, over_seeds
 from cleanrl_style import protocol
@@ -126,13 +126,16 @@ def figure_of(name: str) -> Callable[[Results], str]:
 
 
 def flags(setting: str) -> str:
-    """A row's setting as flags of the command line; lockstep, which all runs of the experiments share, left out."""
-    words = []
-    for item in setting.split(", "):
-        name, _, value = item.partition("=")
-        if name not in ("default", "vectorization"):
-            words.append(f"--{name.replace('_', '-')}" + ("" if value == "True" else f" {value.replace(',', ' ')}"))
-    return f"`{' '.join(words)}`" if words else ""
+    """A row's setting as flags of the command line, as code."""
+    words = methods.flags(setting)
+    return f"`{words}`" if words else ""
+
+
+def titled(script: str, shown_flags: str) -> str:
+    """A method's name and its flags; MOEA/D is a flag of NSGA-II's script."""
+    if (script, shown_flags) == ("moea", "`--algorithm moead`"):
+        return "MOEA/D"
+    return ", ".join(filter(None, (methods.title(script), shown_flags)))
 
 
 def rows_of(results: Results, script: str, environment: str | None = None) -> list[tuple]:
@@ -143,20 +146,19 @@ def rows_of(results: Results, script: str, environment: str | None = None) -> li
         for key, replicates in results.rows_of_two_objectives().items()
         if key[0] == script and replicates and environment in (None, key[1])
     ]
-    titled = []
+    shown_rows = []
     for (_, env_id, setting), replicates in found:
         parts = [flags(setting), "" if env_id in (GENERALIST, environment) else f"`{env_id}`"]
         title = ", ".join(filter(None, parts)) or "default"
         is_papers = title == "default" and env_id == GENERALIST
         papers = published.get(methods.paper_name(script), np.nan) if is_papers else np.nan
-        titled.append((title, replicates, papers, script in methods.TRAINED))
-    return sorted(titled, key=lambda row: row[0] != "default")
+        shown_rows.append((title, replicates, papers, script in methods.TRAINED))
+    return sorted(shown_rows, key=lambda row: row[0] != "default")
 
 
 def named(script: str, rows: list) -> list:
     """The rows with the method's name before the flags."""
-    name = methods.title(script)
-    return [(name if title == "default" else f"{name}, {title}", *rest) for title, *rest in rows]
+    return [(titled(script, "" if title == "default" else title), *rest) for title, *rest in rows]
 
 
 def plans(results: Results, environment: str) -> list[tuple[str, list]]:
@@ -176,7 +178,7 @@ def other_worlds(results: Results) -> str:
     lacking = list(experiments.OTHER_WORLDS)
     for (script, env_id, setting), replicates in results.rows.items():
         if env_id in experiments.OTHER_WORLDS and replicates:
-            title = ", ".join(filter(None, (methods.title(script), flags(setting))))
+            title = titled(script, flags(setting))
             cells = cells_of(main_results.scores(replicates), columns)
             text += f"| `{env_id}` | {title} | {len(replicates)} | " + " | ".join(cells) + " |\n"
             lacking = [name for name in lacking if name != env_id]
@@ -185,27 +187,22 @@ def other_worlds(results: Results) -> str:
 
 
 def distances(results: Results) -> str:
-    """How near agents and fixed strategies come to the best known plans of the fronts' sites, in whole percent."""
-    table = distance_to_best.make(results)
-    if not table.seeds.any():
-        return not_run("difficulty")
-    shares = [f"share_{weight:g}" for weight in experiments.WEIGHTS] + ["hypervolume"]
-    text = (
-        "| % of the best known gain at carbon weight | seeds | "
-        + " | ".join(f"{weight:g}" for weight in experiments.WEIGHTS)
-        + " | % of the hypervolume |\n"
-        + "|---" * 8
-        + "|\n"
+    """How much of the best known plans' gains agents, planners and blind planting reach, in percent."""
+    table = best_known.make(results)
+    columns = {f"share_{weight:g}": f"{weight:g}" for weight in best_known.WEIGHTS} | {"share": "all"}
+    shown = (*methods.TRAINED, "plus_100", best_known.CONSTANT)
+    table = table[table.method.isin(shown) & (table.policy != "sampled")]
+    if table.empty:
+        return not_run("main")
+    cells = []
+    for _, row in table.iterrows():
+        blind = row.method == best_known.CONSTANT
+        title = "the best constant plan of each site" if blind else titled(row.method, flags(row.setting))
+        seeds = f"{row.seeds:.0f}" if row.method in methods.TRAINED else ""
+        cells.append([title, f"`{row.environment}`", seeds, *(excerpts.with_interval(row, name) for name in columns)])
+    return excerpts.markdown(
+        ["% of the best known gain at carbon weight", "environment", "seeds", *columns.values()], cells
     )
-    for _, row in table[table.sites.str.endswith(distance_to_best.ALL)].iterrows():
-        trained = row.method in methods.TRAINED
-        words = [methods.title(row.method), *((flags(row.setting), row.policy) if trained else ())]
-        cells = [", ".join(filter(None, words)), str(row.seeds) if trained else ""]
-        for name in shares:
-            low, high = row[f"{name}_low"], row[f"{name}_high"]
-            cells.append(f"{row[name]:.0f}" + ("" if np.isnan(low) else f" ({low:.0f} .. {high:.0f})"))
-        text += "| " + " | ".join(cells) + " |\n"
-    return text
 
 
 #: Of the table `learning_difficulty`, rows that docs/learning.md does not show.
@@ -249,7 +246,7 @@ def other_libraries(results: Results) -> str:
         scores = main_results.scores(replicates)
         shown = [scores["score_greedy"], scores["score_sampled"], scores.get("gain_scalarized", np.nan)]
         shown += [hours, cost.peak_memory_mb / 1000]
-        cells = [", ".join(filter(None, (methods.title(script), flags(setting)))), f"`{env_id}`", str(len(replicates))]
+        cells = [titled(script, flags(setting)), f"`{env_id}`", str(len(replicates))]
         cells += ["" if np.isnan(x) else f"{x:.{digits}f}" for x, digits in zip(shown, (0, 0, 2, 1, 1), strict=True)]
         cells += [f"{cost.steps:,.0f}", f"{cost.own_evaluation_steps:,.0f}"]
         text += "| " + " | ".join(cells) + " |\n"
@@ -340,7 +337,7 @@ def section(results: Results, name: str) -> str:
 
 EXPERIMENTS_OF = {"all": ["main"], "balanced": ["balanced"], "heuristics": ["main", "balanced"]}
 FIGURES = {
-    "learning_curves": (learning_curves, "Returns and gains in training, against fixed strategies"),
+    "learning_curves": (learning_curves, "Returns of training episodes, and gains on validation sites"),
     "learning_asymmetry": (
         learning_asymmetry,
         "EUPG of one weight: returns and gains in training; panel f: single sites, with a baseline and without",

@@ -19,19 +19,14 @@ GENERALIST, BALANCED, ONE_SITE = "boreal-generalist-v0", "boreal-balanced-v0", "
 OTHER_WORLDS = ("boreal-timber-v0", "boreal-four-v0", "boreal-warming-v0")
 STUDIES = (
     "constant_plans",
-    "training_gains",
     "mechanism_pairs",
     "site_warming",
     "signal_to_noise",
     "gradient_noise",
-    "distance_to_best",
 )
-READING = ("training_gains", "site_warming", "distance_to_best")  # studies that read the runs before them
+READING = ("site_warming",)  # studies that read the runs before them
 WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SITE_SEEDS = (1, 2, 3, 4, 5)
-# Three of the twelve sites of results/fronts: a typical one, one where the carbon end of the front costs thaw, and one
-# where planting costs it in this model and thinning does not.
-FRONT_SITES = (3_000_000_078, 3_000_000_210, 3_000_000_058)
 # analysis/studies/measure_balance.py: both returns vary equally between policies that none beats in both at 1.8 kgC m-2
 # yr-1; the paper's rewards are at 2.0, so the carbon reward times 2.0 / 1.8
 REWARD_SCALES = (1.11, 1.0)
@@ -76,8 +71,8 @@ class Job:
         """The flags as on the command line."""
         words = []
         for name, value in self.flags.items():
-            flag = f"--{name.replace('_', '-')}"
-            values = value if isinstance(value, tuple) else () if value is True else (value,)
+            flag = f"--{'no-' if value is False else ''}{name.replace('_', '-')}"
+            values = value if isinstance(value, tuple) else () if isinstance(value, bool) else (value,)
             words += [flag, *(f"{v:g}" if isinstance(v, float) else str(v) for v in values)]
         return words
 
@@ -138,7 +133,7 @@ def main_table(seeds) -> list[Job]:
     """Heuristics and constant plans, then the methods, a seed of all before the next."""
     methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in LEARNERS]
     fixed = [Job("main", script) for script in (*STRATEGIES, "constant_plans")]
-    return [*fixed, *methods, Job("main", "training_gains")]
+    return [*fixed, *methods]
 
 
 def balanced(seeds) -> list[Job]:
@@ -272,29 +267,9 @@ def mechanisms(seeds) -> list[Job]:
     return [Job("mechanisms", script) for script in ("mechanism_pairs", "site_warming")]
 
 
-def front_sites(seeds) -> list[Job]:
-    """Gated PPO on one site of the fronts; the site's number is the training seed too."""
-    jobs = []
-    for seed in seeds_of(len(FRONT_SITES), seeds):
-        site = {"site_seed": FRONT_SITES[seed - 1]}
-        jobs.append(Job("single", "zero_change", site))
-        jobs.append(
-            trained(
-                "single",
-                "ppo_gated",
-                seed,
-                total_timesteps=DEFAULT_STEPS[SITE_SPECIFIC],
-                ent_coef=0.0,
-                per_objective_advantages=True,
-                **site,
-            )
-        )
-    return jobs
-
-
 def difficulty(seeds) -> list[Job]:
-    """Studies of how hard thaw is to learn; the distance to the best plans reads the checkpoints of all runs."""
-    return [Job("difficulty", script) for script in ("signal_to_noise", "gradient_noise", "distance_to_best")]
+    """Studies of how hard thaw is to learn, which read no run."""
+    return [Job("difficulty", script) for script in ("signal_to_noise", "gradient_noise")]
 
 
 class Experiment(NamedTuple):
@@ -317,10 +292,7 @@ EXPERIMENTS = {
     "controls": Experiment(controls, "what of the curriculum it is that helps"),
     "variants": Experiment(variants, "gated PPO and EUPG with one choice changed"),
     "mechanisms": Experiment(mechanisms, "physical conflicts, counterfactual pairs, warming of selected sites"),
-    "single": Experiment(front_sites, "gated PPO on one site alone, under all its weathers and first stands"),
-    "difficulty": Experiment(
-        difficulty, "why thaw is hard to learn: noise of actions and gradients; distance to the best known plans"
-    ),
+    "difficulty": Experiment(difficulty, "why thaw is hard to learn: noise of actions and gradients"),
     "budgets": Experiment(budgets, "group PPO with 100,000 and 1,000,000 steps"),
 }
 

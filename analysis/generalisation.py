@@ -168,7 +168,10 @@ def splits_of(task: protocol.Task, wanted: Sequence[str]) -> list[str]:
 def evaluation_of(folder: Path, config: dict, task: protocol.Task, episodes: int, split: str) -> pd.DataFrame:
     """A run's episodes on a split, both policies: of the test sites what it left, else played."""
     if split == TEST:
-        found = runs.read_run(folder).tables["evaluation"]
+        run = runs.read_run(folder)
+        if runs.of_another_physics([run]):
+            print(f"{folder}: its test sites are of another source of the simulator than this", file=sys.stderr)
+        found = run.tables["evaluation"]
         chosen = found[found.seed.isin(sites.evaluation_seeds(task, episodes))]
         if chosen.seed.nunique() < episodes:
             raise ValueError(f"{folder}: it was evaluated on {chosen.seed.nunique()} of the {episodes} sites")

@@ -24,7 +24,6 @@ from analysis.tables import (
     best_known,
     curriculum_selection,
     detailed_objectives,
-    distance_to_best,
     growing_season_correlations,
     lambda_violations,
     learned_strategies,
@@ -53,7 +52,6 @@ TABLES = (
     runtime,
     learning_difficulty,
     single_sites,
-    distance_to_best,
     best_known,
 )
 

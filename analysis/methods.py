@@ -71,6 +71,17 @@ def title(script: str) -> str:
     return METHODS[script].title if script in METHODS else script
 
 
+def flags(setting: str) -> str:
+    """A row's setting as flags of the command line; lockstep, which all runs of the experiments share, left out."""
+    words = []
+    for item in setting.split(", "):
+        name, _, value = item.partition("=")
+        if name not in ("default", "vectorization"):
+            flag = f"--{'no-' if value == 'False' else ''}{name.replace('_', '-')}"
+            words.append(flag if value in ("True", "False") else f"{flag} {value.replace(',', ' ')}")
+    return " ".join(words)
+
+
 def paper_name(script: str) -> str | None:
     """What the paper's tables call a script; None if they do not have it."""
     return METHODS[script].paper if script in METHODS else None

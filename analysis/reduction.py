@@ -9,7 +9,7 @@ last_year    percentiles of the columns of SPREAD in the last year; a row a weig
 learning     the training in BINS equal parts: how many episodes, their means and standard deviations
 validation   gains on validation sites in the course of the training, as the run has them
 composition  the last fifth of the training: episodes by their last year's conifer fraction, in BINS classes
-sample       every EVERY-th round of the training's episodes, one by one
+sample       every EVERY-th round of a curriculum's training episodes, one by one
 selection    what a curriculum accepted, and how its threshold moved
 timing       seconds by phase
 cost         of another library's run: steps, of training and of its own evaluations, and its largest memory
@@ -56,13 +56,13 @@ def reduce(tables: dict[str, pd.DataFrame], steps: int | None, primary: str) -> 
         kept |= {"years": years(record), "last_year": last_year(record)}
     if "episodes" in tables:
         episodes = tables["episodes"]
-        kept |= {"learning": learning(episodes, steps), "sample": sample(episodes)}
+        kept["learning"] = learning(episodes, steps)
         if "validation" in tables:
             kept["validation"] = tables["validation"]
         if episodes[list(EPISODE_INFO)].notna().all(axis=None):
             kept["composition"] = composition(episodes)
         if "selected" in episodes:
-            kept["selection"] = selection(episodes)
+            kept |= {"sample": sample(episodes), "selection": selection(episodes)}
     return {name: parse(as_text(name, table)) for name, table in kept.items()}
 
 
@@ -153,14 +153,12 @@ def composition(episodes: pd.DataFrame) -> pd.DataFrame:
 
 
 def sample(episodes: pd.DataFrame) -> pd.DataFrame:
-    """The episodes of every EVERY-th round: an episode in each environment. The sites of a curriculum's too."""
+    """The episodes of every EVERY-th round, an episode in each environment: whose site it was, and whether selected."""
     number = episodes.groupby("env").cumcount() + 1
     every = EVERY if number.max() >= FEWEST_ROUNDS else 1
     objectives = fronts.objectives_of(episodes.columns)
-    columns = ["global_step", "env", *fronts.weight_columns(objectives), *fronts.return_columns(objectives)]
-    if "selected" in episodes:
-        columns += ["site_seed", "selected"]
-    return episodes.loc[number % every == 0, columns]
+    columns = [*fronts.weight_columns(objectives), *fronts.return_columns(objectives), "site_seed", "selected"]
+    return episodes.loc[number % every == 0, ["global_step", "env", *columns]]
 
 
 def selection(episodes: pd.DataFrame) -> pd.DataFrame:

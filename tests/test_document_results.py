@@ -92,7 +92,9 @@ def test_a_figure_is_shown_once_it_is_drawn(tmp_path, monkeypatch):
     Path("results/figures").mkdir(parents=True)
     Path("results/figures/learning_curves.png").touch()
     section = document_results.section(results, "figure_learning_curves")
-    assert section.startswith("![Returns and gains") and section.endswith("(../results/figures/learning_curves.png)\n")
+    assert section.startswith("![Returns of training episodes") and section.endswith(
+        "(../results/figures/learning_curves.png)\n"
+    )
 
 
 def test_a_page_without_a_section_is_named(pages):

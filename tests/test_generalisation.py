@@ -193,6 +193,14 @@ def test_a_run_is_judged_inside_and_outside(run, capsys):
     assert "     2     50" in out and "     2     25" in out and "+0.25" in out
 
 
+def test_a_run_of_another_physics_is_named(run, capsys):
+    folder, _ = run
+    config = json.loads((folder / "config.json").read_text())
+    (folder / "config.json").write_text(json.dumps(config | {"physics": "another"}))
+    judge(folder, split=("calmer",))
+    assert f"{folder}: its test sites are of another source of the simulator" in capsys.readouterr().err
+
+
 def test_searched_plans_give_rows_of_their_own(run, tmp_path):
     folder, played = run
     table = pd.DataFrame(

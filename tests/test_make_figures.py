@@ -1,4 +1,5 @@
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from tiny_runs import TINY_RUNS, write_run, write_run_of_three
@@ -66,6 +67,20 @@ def test_what_is_drawn_is_what_the_runs_hold(figures):
     learning = lettered(figures["individual_objectives"])["a"].lines[0]
     assert learning.get_ydata() == pytest.approx([0, 1, 2, 3])
     assert learning.get_xdata() == pytest.approx(np.array([75, 150, 225, 300]) - 3.75)
+
+
+def test_gains_are_of_the_validation_sites(tmp_path):
+    course = pd.DataFrame({"global_step": [500, 500, 1000, 1000], "carbon_gain": [0.0, 1.0, 2.0, 4.0]})
+    for seed in (1, 2):
+        write_run(tmp_path / str(seed), "ppo_gated", seed, vectorization="lockstep")
+        course.assign(carbon_gain=course.carbon_gain * seed).to_csv(
+            tmp_path / str(seed) / "validation.csv", index=False
+        )
+    ax = Figure().subplots()
+    common.validation_curve(
+        ax, Results((tmp_path,), experiments.jobs(), tmp_path).of("main", "ppo_gated"), "carbon_gain", "C0"
+    )
+    assert ax.lines[0].get_xydata().tolist() == [[0.5, 0.75], [1.0, 4.5]]
 
 
 def test_the_same_bytes_again(tmp_path, monkeypatch):

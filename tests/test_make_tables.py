@@ -129,7 +129,7 @@ def test_season_violations_runtime_details(tables):
 
 
 def test_all_tables_in_all_formats(tables):
-    assert len(make_tables.TABLES) == 14
+    assert len(make_tables.TABLES) == 13
     stems = [path.with_suffix("") for path in tables.glob("*.csv")]
     assert {stem.name for stem in stems} == {
         *("main_results", "detailed_objectives", "lambda_violations", "learned_strategies", "runtime", "warming_flux"),

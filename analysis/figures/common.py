@@ -94,6 +94,9 @@ def wanting(ax, results, experiment: str, script: str) -> bool:
 def finish(ax, **labels) -> None:
     """Labels of a panel; one that has drawn nothing names its commands, one that lacks some too."""
     wanted = getattr(ax, "wanted", [])
+    if not ax.has_data() and getattr(ax, "too_short", False):
+        ax.text(0.5, 0.5, "too short a training to be followed", transform=ax.transAxes, ha="center", fontsize=5)
+        return
     if not ax.has_data():
         no_data(ax, *(job.command for job in wanted))
         return
@@ -149,6 +152,16 @@ def learning_curve(ax, replicates, column: str, colour, label: str, statistic: s
     """A column of the training episodes of replicates of one run each."""
     runs = [one.runs[0] for one in replicates]
     training_curve(ax, [run.course(column, statistic) for run in runs], steps_of(runs), colour, label)
+
+
+def validation_curve(ax, replicates, column: str, colour) -> None:
+    """A column of the courses on validation sites, in the mean of the weights; none until every seed has one."""
+    courses = [one.runs[0].tables.get("validation", pd.DataFrame()) for one in replicates]
+    if any(course.empty for course in courses):
+        ax.too_short = True
+        return
+    curves = pd.concat([course.groupby("global_step")[column].mean() for course in courses], axis=1)
+    band(ax, curves.index / 1000, curves.to_numpy().T, colour, None, marker="o")
 
 
 def year_curve(ax, replicates, variable: str, colour, label: str, style="-") -> None:

@@ -10,17 +10,16 @@ from analysis.figures.common import (
     learning_curve,
     legend,
     letter,
-    no_data,
     steps_of,
     training_curve,
+    validation_curve,
     wanting,
 )
-from analysis.figures.learning_curves import gain_curve
 
 SIZE = (7.2, 5.0)
 MADE_BY = "python analysis/reproduce.py --only fixed site"
 CAPTION = (
-    "Fixed λ EUPG, one agent a weight; sums over 50 years; gains: less zero change on the same episodes; "
+    "Fixed λ EUPG, one agent a weight; sums over 50 years. (c) Greedy, over doing nothing, on validation sites; "
     f"{SEEDS_95}; (b, f) over sites. (f) agents of one objective alone, its gain in training; dashed: with "
     "--baseline others."
 )
@@ -39,16 +38,14 @@ def draw(figure, results) -> None:
     """Six panels; in the first five a curve for each weight."""
     *axes, alone = figure.subplots(2, 3).flat
     letter([*axes, alone], [*(title for *_, title in PANELS.values()), "own gain, single sites"])
-    colours, nothing = matplotlib.colormaps[WEIGHT_COLOURS], results.study("training_gains")
+    colours = matplotlib.colormaps[WEIGHT_COLOURS]
     for ax, (experiment, column, label, _) in zip(axes, PANELS.values(), strict=True):
-        if not wanting(ax, results, experiment, "eupg_fixed_lambda") and column == GAIN and nothing is None:
-            no_data(ax, "python analysis/studies/training_gains.py")
-            continue
+        wanting(ax, results, experiment, "eupg_fixed_lambda")
         agents = [one for replicate in results.of(experiment, "eupg_fixed_lambda") for one in replicate.each_run()]
         for weight in sorted({one.runs[0].arguments["preference"] for one in agents}):
             of_weight = [one for one in agents if one.runs[0].arguments["preference"] == weight]
             if column == GAIN:
-                gain_curve(ax, of_weight, nothing, column, colours(0.9 * weight))
+                validation_curve(ax, of_weight, column, colours(0.9 * weight))
             else:
                 learning_curve(ax, of_weight, column, colours(0.9 * weight), f"weight of carbon {weight:g}")
         finish(ax, ylabel=label, **STEPS)

@@ -9,9 +9,8 @@ import textwrap
 import numpy as np
 from matplotlib.lines import Line2D
 
-from analysis import metrics
+from analysis import methods, metrics
 from analysis.figures.common import WEIGHT_COLOURS, letter
-from analysis.methods import METHODS
 from analysis.results import PAIR
 from analysis.tables.many_objectives import file_stem
 
@@ -57,7 +56,7 @@ def drawn(objectives, followers, fixed):
             for k, ax in enumerate(row[1:]):
                 triangle = ternary_diagram(ax, table, objectives, k, (low[k], high[k]))
                 figure.colorbar(triangle, ax=ax, shrink=0.7, label=f"{objectives[k]} return")
-        names = [*objectives, "equal weights", *(["fixed strategy"] if references else [])]
+        names = [*objectives, "shared", *(["fixed strategy"] if references else [])]
         looks = [(colour, "-") for colour in COLOURS[: len(objectives)]] + [(EQUAL, "-"), (REFERENCE, "--")]
         handles = [Line2D([], [], color=colour, linestyle=style) for colour, style in looks[: len(names)]]
         figure.legend(handles, names, loc="outside upper center", ncols=3)
@@ -66,9 +65,8 @@ def drawn(objectives, followers, fixed):
 
 
 def title_of(key) -> str:
-    """A method's title, with its setting if that is not the usual one."""
-    title = METHODS[key[0]].title if key[0] in METHODS else key[0]
-    return title if key[2] == "default" else f"{title}, {key[2]}"
+    """A method's title, with its flags if it has any."""
+    return ", ".join(filter(None, (methods.title(key[0]), methods.flags(key[2]))))
 
 
 def mean_table(replicates):

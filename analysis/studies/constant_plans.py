@@ -25,7 +25,7 @@ from cleanrl_style.protocol.reference import reference_returns
 from sim.task.preference import check_weights
 
 ENVIRONMENTS = (experiments.GENERALIST, experiments.BALANCED)
-MORE_OBJECTIVES = ("boreal-timber-v0", "boreal-four-v0")  # measured on first use: their returns do not ship
+MORE = ("boreal-timber-v0", "boreal-four-v0", "boreal-warming-v0")  # measured on first use: their returns do not ship
 DENSE_CONIFER = 24
 
 
@@ -100,7 +100,7 @@ def main(args: Args) -> None:
     tables = {
         "constant_plans": (
             {"episodes": args.eval_episodes, "physics": physics},
-            lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in (*ENVIRONMENTS, *MORE_OBJECTIVES)]),
+            lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in (*ENVIRONMENTS, *MORE)]),
         ),
         "constant_plans_of_sites": ({"sites": sites, "physics": physics}, lambda: study_of_sites(sites)),
     }
