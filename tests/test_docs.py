@@ -9,13 +9,14 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from scripts import ROOT
+from scripts import ROOT, run_script
 
 from analysis import follow_readme
+from cleanrl_style import protocol
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md"))]
 TEXTS = {path: path.read_text(encoding="utf-8") for path in PAGES}
-SCRIPTS = r"python ((?:analysis|baselines_heuristic|cleanrl_style)/[\w/]+\.py)((?:[^\n`#&|<]|\\\n)*)"
+SCRIPTS = r"python ((?:analysis|baselines_heuristic|cleanrl_style)/[\w/]+\.py)((?:\\\n|[^\n`#&|<])*)"
 
 
 def fields(path):
@@ -47,6 +48,19 @@ def test_commands_name_scripts_and_flags_that_exist(page):
         flags = [flag.replace("-", "_") for flag in re.findall(r"(?<!\S)--([a-z][\w-]*)", rest)]
         wrong += [f"{script} --{flag}" for flag in flags if flag not in {*known, "help"}]
     assert wrong == []
+
+
+@pytest.mark.parametrize("page", sorted(ROOT.glob("docs/algorithms/*.md")), ids=lambda page: page.stem)
+def test_trainings_are_accepted_as_they_stand(page, monkeypatch):
+    def make_task(args, **more):
+        raise SystemExit("accepted")
+
+    monkeypatch.setattr(protocol, "make_task", make_task)
+    for block in re.findall(r"```bash\n(.*?)```", TEXTS[page], re.DOTALL):
+        for script, flags in re.findall(SCRIPTS, block):
+            if script.startswith("cleanrl_style/"):
+                with pytest.raises(SystemExit, match="^accepted$"):
+                    run_script(script, *flags.replace("\\\n", " ").split())
 
 
 def test_commands_with_a_wrong_flag_would_be_found():
