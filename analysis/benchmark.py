@@ -311,8 +311,9 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
             (f"{kind}: evaluation", "ms per year"): year,
         }
 
-    workers = [started(len(block), threads=1) for block in split(8, available_cores())]
-    kinds = {"async": (8, workers), "lockstep": (32, [started(32)])}
+    kinds = {"lockstep": (32, [started(32)])}
+    if not args.quick:
+        kinds = {"async": (8, [started(len(block), threads=1) for block in split(8, available_cores())])} | kinds
     return [partial(measure, kind, *stands) for kind, stands in kinds.items()]
 
 

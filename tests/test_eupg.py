@@ -135,15 +135,12 @@ def learn(script, folder, *arguments):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("utility", ["total", "future"])
-def test_fixed_lambda_learns_the_toy(tmp_path, utility):
+def test_fixed_lambda_learns_the_toy(tmp_path):
     returns = learn(
         "eupg_fixed_lambda",
         tmp_path,
         "--preference",
         1,
-        "--utility",
-        utility,
         "--learning-rate",
         0.005,
         "--total-timesteps",
@@ -155,7 +152,7 @@ def test_fixed_lambda_learns_the_toy(tmp_path, utility):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_variable_lambda_learns_to_follow_the_preference(tmp_path, seed):
     """Without a bonus for entropy the policy settles before it has told the preferences apart."""
     run_script(

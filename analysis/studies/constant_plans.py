@@ -96,11 +96,12 @@ def main(args: Args) -> None:
     args = replace(args, eval_episodes=2) if args.quick else args
     folder = paths.studies(args.quick)
     sites = experiments.SITE_SEEDS[: 1 if args.quick else None]
+    environments = (*ENVIRONMENTS, *MORE[: 1 if args.quick else None])
     physics = open_loop.fingerprint()
     tables = {
         "constant_plans": (
             {"episodes": args.eval_episodes, "physics": physics},
-            lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in (*ENVIRONMENTS, *MORE)]),
+            lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in environments]),
         ),
         "constant_plans_of_sites": ({"sites": sites, "physics": physics}, lambda: study_of_sites(sites)),
     }
