@@ -463,6 +463,9 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
         check_saved(state, "vector")
+        generators = state["generators"] or [None] * self.num_envs
+        if len(generators) != self.num_envs:
+            raise ValueError(f"state: generators of {self.num_envs} stands are allowed, got {len(generators)}")
         self._episodes.set_state(state["episodes"])
         self._generators = state["generators"] and [restored_generator(saved) for saved in state["generators"]]
 

@@ -109,9 +109,10 @@ def simulate(
     if not isinstance(hold_stand, (bool, np.bool_)):
         raise ValueError(f"hold_stand: True or False is allowed, got {hold_stand!r}")
     interval = DEFAULT_MINUTES if forcing is None else interval_of(forcing)
-    if interval > stands.LONGEST_STEP_MINUTES:
+    if interval > stands.LONGEST_STEP_MINUTES or 1440 % interval:
         raise ValueError(
-            f"forcing: it comes every {interval} minutes; at most {stands.LONGEST_STEP_MINUTES} are allowed"
+            f"forcing: it comes every {interval} minutes; a divisor of a day of at most {stands.LONGEST_STEP_MINUTES} "
+            "is allowed"
         )
     if time_step_minutes is None:
         time_step_minutes = max(DEFAULT_MINUTES, interval)

@@ -84,9 +84,14 @@ def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not low <= value <= high:
             raise ValueError(f"initial {name} = {value!r}: a number in [{low:g}, {high:g}] is allowed")
     classes = [values[name] for name in CLASS_NAMES if name in values]
-    stems = sum(classes) if classes else values.get("density_stems_ha", 1.0)
-    if stems == 0.0 and values.get("biomass_kgc_m2", 0.0) > 0.0:
-        raise ValueError(f"initial biomass_kgc_m2 = {values['biomass_kgc_m2']:g}: without stems, 0 is allowed")
+    stems, biomass = sum(classes) if classes else values.get("density_stems_ha"), values.get("biomass_kgc_m2", 0.0)
+    if stems == 0.0 and biomass > 0.0:
+        raise ValueError(f"initial biomass_kgc_m2 = {biomass:g}: without stems, 0 is allowed")
+    if stems is not None and biomass > (most := stems * LARGEST_STEM_KGC * 1e-4):
+        raise ValueError(
+            f"initial biomass_kgc_m2 = {biomass:g}: of {stems:g} stems/ha at most {most:.4g} is allowed, "
+            f"{LARGEST_STEM_KGC:g} kgC a stem"
+        )
     return {name: float(value) for name, value in values.items()}
 
 

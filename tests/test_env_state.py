@@ -73,6 +73,15 @@ def test_half_a_state_is_refused_by_what_it_lacks():
             env.set_state(saved)
 
 
+def test_generators_of_fewer_stands_are_refused():
+    envs = quick_vector(2)
+    envs.reset(seed=1)
+    saved = envs.get_state()
+    saved["generators"].pop()
+    with pytest.raises(ValueError, match="^state: generators of 2 stands are allowed, got 1$"):
+        envs.set_state(saved)
+
+
 def test_the_state_of_a_vector_environment_is_not_that_of_one():
     one, envs = quick(), quick_vector(1)
     one.reset(seed=1), envs.reset(seed=1)

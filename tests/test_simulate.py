@@ -492,10 +492,12 @@ def test_forcing_is_refused(make, message):
         simulate(forcing=make())
 
 
-def test_a_forcing_of_three_hours_is_named_for_what_it_is(monkeypatch):
+@pytest.mark.parametrize("minutes", [180, 7])
+def test_a_forcing_of_another_interval_is_named_for_what_it_is(monkeypatch, minutes):
     monkeypatch.setattr(stands, "LONGEST_STEP_MINUTES", 120)
-    with pytest.raises(ValueError, match="^forcing: it comes every 180 minutes; at most 120 are allowed$"):
-        simulate(forcing=observed(minutes=180))
+    message = f"^forcing: it comes every {minutes} minutes; a divisor of a day of at most 120 is allowed$"
+    with pytest.raises(ValueError, match=message):
+        simulate(forcing=observed(minutes=minutes))
 
 
 @pytest.mark.parametrize("minutes", [120, 360])
@@ -648,6 +650,10 @@ BAD = {
     "carbon of no stems of a class": (
         {"initial": {"conifer_old_stems_ha": 0, "biomass_kgc_m2": 5.0}},
         r"initial biomass_kgc_m2 = 5: without stems, 0 is allowed",
+    ),
+    "more carbon than stems hold": (
+        {"initial": {"density_stems_ha": 10.0, "biomass_kgc_m2": 6.0}},
+        r"initial biomass_kgc_m2 = 6: of 10 stems/ha at most 0.12 is allowed, 120 kgC a stem",
     ),
     "unknown stock": ({"initial": {"carbon": 1}}, r"unknown initial stock 'carbon'; allowed: density_stems_ha"),
     "negative stock": ({"initial": {"soil_kgc_m2": -1}}, r"initial soil_kgc_m2 = -1: a number in \[0, 100\]"),
