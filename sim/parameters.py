@@ -194,10 +194,16 @@ def check_weather(weather: str) -> dict[str, bool]:
     return {"weather_as_observed": check_name("weather", weather, WEATHERS) == "observed"}
 
 
+def brief(value) -> str:
+    """A value as an error shows it: in one line, a table or a long list by its type alone."""
+    text = repr(value)
+    return text if len(text) <= 100 and "\n" not in text else f"of type {type(value).__name__}"
+
+
 def check_name(what: str, value, allowed: Sequence[str]) -> str:
     """The value, which has to be one of the names that are allowed."""
     if not isinstance(value, str) or value not in allowed:
-        raise ValueError(f"{what} {value!r}: allowed are {', '.join(allowed)}")
+        raise ValueError(f"{what} {brief(value)}: allowed are {', '.join(allowed)}")
     return value
 
 

@@ -10,7 +10,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from sim.parameters import CONSTANTS
+from sim.parameters import CONSTANTS, brief
 
 FIRST_YEAR = 2025
 TABLE = "scenarios.csv"
@@ -77,7 +77,9 @@ def check_scenario(scenario) -> Path | None:
         return Path(columns, f"{scenario} is from {FIRST_YEAR} to {table['year'][-1]}")
     if not isinstance(scenario, Mapping) and not hasattr(scenario, "columns"):
         named = ", ".join(SCENARIOS)
-        raise ValueError(f"scenario {scenario!r}: allowed are None, {named}, or a dict or DataFrame of a path by year")
+        raise ValueError(
+            f"scenario {brief(scenario)}: allowed are None, {named}, or a dict or DataFrame of a path by year"
+        )
     columns = {}
     for name in scenario:
         if name not in COLUMNS and name != YEAR:

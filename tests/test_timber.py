@@ -5,6 +5,7 @@ import math
 
 import gymnasium as gym
 import numpy as np
+import pandas as pd
 import pytest
 from playing import QUICK, play, quick
 
@@ -160,6 +161,10 @@ def test_a_table_of_ones_own(tmp_path):
 
 REFUSED = {
     "country": ({"timber": "norway"}, "timber 'norway': allowed are finland, sweden, canada, a path to a .csv"),
+    "a table": (
+        {"timber": pd.DataFrame({"item": ["roads"]})},
+        "timber of type DataFrame: allowed are finland, sweden, canada",
+    ),
     "file": ({"timber": "none.csv"}, "timber 'none.csv': cannot be read"),
     "gap": ({"timber": {"roads": 1.0}}, "timber: sawlog_conifer, .* missing"),
     "negative": ({"timber": {**PRICES, "roads": -1.0}}, "timber: roads = -1.0; a finite number, not negative"),

@@ -13,6 +13,7 @@ import numpy as np
 
 from sim.assortment import PRODUCTS
 from sim.io.table import check_utf8
+from sim.parameters import brief
 
 SPECIES = ("conifer", "deciduous")
 
@@ -101,7 +102,7 @@ def read_prices(timber) -> dict[str, float]:
     if isinstance(timber, (str, Path)) and str(timber).endswith(".csv"):
         return prices_of(f"timber {str(timber)!r}", rows_of(Path(timber)))
     raise ValueError(
-        f"timber {timber!r}: allowed are {', '.join(countries())}, a path to a .csv, a dict of {', '.join(ITEMS)}"
+        f"timber {brief(timber)}: allowed are {', '.join(countries())}, a path to a .csv, a dict of {', '.join(ITEMS)}"
     )
 
 
