@@ -332,9 +332,11 @@ class BorealEnv(Described, gym.Env, EzPickle):
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
         check_saved(state, "single")
-        self._begun_with = None
+        generator = restored_generator(state["generator"])
+        if generator is None:
+            raise ValueError("state: a generator's state is allowed, got None")
         self._episodes.set_state(state["episodes"])
-        self.np_random.bit_generator.state = state["generator"]
+        self.np_random, self._begun_with = generator, None
 
 
 # ---------------------------------------------------------------------------------------------------------------
@@ -463,11 +465,14 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
         check_saved(state, "vector")
-        generators = state["generators"] or [None] * self.num_envs
-        if len(generators) != self.num_envs:
-            raise ValueError(f"state: generators of {self.num_envs} stands are allowed, got {len(generators)}")
+        generators = state["generators"]  # None before the first reset
+        if generators is not None:
+            known = [restored_generator(saved) for saved in generators if saved] if isinstance(generators, list) else []
+            if len(known) != self.num_envs:
+                raise ValueError(f"state: generators of {self.num_envs} stands are allowed, got {len(known)}")
+            generators = known
         self._episodes.set_state(state["episodes"])
-        self._generators = state["generators"] and [restored_generator(saved) for saved in state["generators"]]
+        self._generators = generators
 
     def _check_open(self) -> None:
         if self.closed:

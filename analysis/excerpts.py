@@ -9,7 +9,7 @@ import pandas as pd
 
 from analysis import paths, stored
 from analysis.studies import boreal_map as region_map
-from analysis.studies import site_choice
+from analysis.studies import site_choice, site_regression
 from cleanrl_style import protocol
 
 VALIDATION = Path("docs/validation.md")
@@ -127,22 +127,32 @@ def boreal_map() -> str:
 
 
 def knowing_the_site() -> str:
-    """What choosing a plan by site is worth; results/studies/site_choice.csv has every weight."""
-    path = site_choice.path()
-    if not path.exists():
-        return "Not run yet: `python analysis/studies/site_choice.py`.\n"
-    table = stored.read(path)
+    """What choosing a plan by site is worth; the two tables in results/studies have every weight."""
+    for study in (site_choice, site_regression):
+        if not study.path().exists():
+            return f"Not run yet: `python {study.__name__.replace('.', '/')}.py`.\n"
+    table, fitted = stored.read(site_choice.path()), stored.read(site_regression.path())
+    fitted = fitted[fitted.weight.astype(str) == site_choice.ALL].set_index("task")
     rows = []
     for row in table[table.weight.astype(str) == site_choice.ALL].itertuples():
         scores = [
             f"{getattr(row, way):.0f} [{getattr(row, f'{way}_low'):.0f}, {getattr(row, f'{way}_high'):.0f}]"
             for way in site_choice.WAYS[1:]
         ]
+        by_parameters = fitted.loc[row.task]
+        scores.append(
+            f"{by_parameters.score:.1f} [{by_parameters.score_low:.1f}, {by_parameters.score_high:.1f}]",
+        )
         thaw = table[(table.task == row.task) & (table.weight.astype(str) == "0.0")].iloc[0]
         spread = [f"{thaw[name]:.2f}" for name in ("conifers_less_deciduous", "sd_sites", "sd_dice")]
         rows.append([f"`{row.task}`", "100", *scores, *spread])
     header = ["task", "one plan for all sites", "the best of each site, on the dice that judge it"]
-    header += ["the best of each site, on other dice", "conifers less deciduous, thaw", "its deviation between sites"]
+    header += [
+        "the best of each site, on other dice",
+        "by a regression on other sites",
+        "conifers less deciduous, thaw",
+        "its deviation between sites",
+    ]
     return markdown([*header, "between dice of a site"], rows)
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.parameters import check_seed
+from sim.parameters import brief, check_seed
 from sim.state import DAYS, DRAWS
 
 
@@ -79,5 +79,8 @@ def restored_generator(state):
     if state is None:
         return None
     generator = np.random.default_rng(0)
-    generator.bit_generator.state = state
+    try:
+        generator.bit_generator.state = state
+    except (TypeError, ValueError, KeyError, OverflowError):
+        raise ValueError(f"state of a generator: that of a PCG64 is allowed, got {brief(state)}") from None
     return generator

@@ -216,18 +216,6 @@ def check_mapping(what: str, mapping) -> dict:
     return mapping
 
 
-def check_keys(what: str, saved, keys: Sequence[str]) -> None:
-    """Refuse what is no dict of these keys, all of them and no other, as `get_state` gives it."""
-    if isinstance(saved, dict) and set(saved) == set(keys):
-        return
-    if isinstance(saved, dict):
-        missing, unknown = [key for key in keys if key not in saved], [str(key) for key in saved if key not in keys]
-        wrong = f"missing: {', '.join(missing)}" if missing else f"unknown: {', '.join(unknown)}"
-    else:
-        wrong = f"got {type(saved).__name__}"
-    raise ValueError(f"{what}: a dict of {', '.join(keys)} from get_state is allowed; {wrong}")
-
-
 def _lookup(table: dict, kind: str, name):
     if name in table:
         return table[name]

@@ -19,7 +19,16 @@ from sim.deadwood import deadwood_in_balance
 from sim.demography import AGES, first_ages
 from sim.draws import Seeds, draw_slice, draw_year, restored_generator
 from sim.management import NOTHING, check_actions, first_cut_age
-from sim.parameters import check_constants, check_keys, check_mechanisms, check_name, check_weather
+from sim.parameters import (
+    SITE_PARAMETERS,
+    brief,
+    check_constants,
+    check_mechanisms,
+    check_name,
+    check_overrides,
+    check_weather,
+)
+from sim.saved import check_array, check_keys, check_settings
 from sim.scenario import CO2, WITHOUT_SCENARIO, check_scenario
 from sim.spin_up import (
     BOUNDARIES,
@@ -48,7 +57,8 @@ from sim.state import (
     STATE_SIZE,
 )
 
-SAVED = ("parameters", "state", "record", "years", "seeds", "weather", "disturbance")  # that the future depends on
+ARRAYS = ("parameters", "state", "record", "years")  # of what a state saves
+SAVED = ("settings", *ARRAYS, "seeds", "weather", "disturbance")  # that the future depends on
 LONGEST_STEP_MINUTES = 120  # beyond, the air is up to 2 K too warm
 
 
@@ -275,29 +285,53 @@ class Stands:
     def get_state(self) -> dict:
         """Everything that the future depends on, as a picklable dict."""
         return {
-            "parameters": self.parameters.copy(),
-            "state": self.state.copy(),
-            "record": self.record.copy(),
-            "years": self.years.copy(),
+            "settings": self._settings(),
+            **{name: getattr(self, name).copy() for name in ARRAYS},
             "seeds": list(self.seeds),
             "weather": [g and g.bit_generator.state for g in self._weather],
             "disturbance": [g and g.bit_generator.state for g in self._disturbance],
         }
 
     def set_state(self, state: dict) -> None:
-        """Continue from a `get_state` of as many stands."""
-        check_keys("state of stands", state, SAVED)
-        if len(state["years"]) != self.number:
-            raise ValueError(f"state of {len(state['years'])} stands given to {self.number}")
-        for name in ("parameters", "state", "record"):
-            there, here = np.shape(state[name]), getattr(self, name).shape
-            if there != here:
-                raise ValueError(f"state of stands: {name} of shape {there}, {here} is allowed; of another version?")
-        self.parameters, self.state = state["parameters"].copy(), state["state"].copy()
-        self.record, self.years = state["record"].copy(), state["years"].copy()
-        self.seeds = list(state["seeds"])
-        self._weather = [restored_generator(g) for g in state["weather"]]
-        self._disturbance = [restored_generator(g) for g in state["disturbance"]]
+        """Continue from a `get_state` of as many stands with the same arguments; ValueError for any other."""
+        what = "state of stands"
+        check_keys(what, state, SAVED)
+        check_settings(what, state["settings"], self._settings())
+        for name in ARRAYS:
+            low, high = (0, 1000) if name == "years" else (-np.inf, np.inf)
+            check_array(f"{what}: {name}", state[name], getattr(self, name), low, high)
+        for name in ("seeds", "weather", "disturbance"):
+            if not isinstance(state[name], list) or len(state[name]) != self.number:
+                raise ValueError(f"{what}: {name}: a list of {self.number} is allowed, got {brief(state[name])}")
+        for seeds, row in zip(state["seeds"], state["parameters"], strict=True):
+            if seeds is None:  # not started yet
+                continue
+            if not isinstance(seeds, Seeds):
+                raise ValueError(f"{what}: seeds: sim.Seeds are allowed, got {brief(seeds)}")
+            values = dict(zip(PARAMETER_NAMES, row.tolist(), strict=True))
+            check_overrides({name: values[name] for name in SITE_PARAMETERS})
+            for name, value in {**self.constants, **self.mechanisms, **self.weather, **WITHOUT_SCENARIO}.items():
+                if values[name] != value:
+                    raise ValueError(f"{what}: {name} = {values[name]:g}, {value:g} is allowed, as in its settings")
+        weather, disturbance = ([restored_generator(g) for g in state[name]] for name in ("weather", "disturbance"))
+        for name in ARRAYS:
+            setattr(self, name, state[name].copy())
+        self.seeds, self._weather, self._disturbance = list(state["seeds"]), weather, disturbance
+
+    def _settings(self) -> dict:
+        """Arguments that a state belongs to, as plain values."""
+        scenario = self.scenario and {"names": self.scenario.names, "values": self.scenario.values.tolist()}
+        return {
+            "time_step_minutes": 1440 // self.steps_per_day,
+            "constants": dict(self.constants),
+            "mechanisms": dict(self.mechanisms),
+            "weather": dict(self.weather),
+            "boundary": self.boundary,
+            "soil_carbon": self.soil_carbon,
+            "scenario": scenario,
+            "hwp_half_life_years": self.products_decay,
+            "harvest_min_class": self.first_cut_age,
+        }
 
     def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None, steps_per_day=None, parameters=None):
         """The new states and records of a year: (stands, fields) each.

@@ -73,6 +73,63 @@ def test_half_a_state_is_refused_by_what_it_lacks():
             env.set_state(saved)
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"time_step_minutes": 120},
+        {"thaw_formulation": "contrast"},
+        {"balanced": True},
+        {"reward": {"thaw_scale": 20.0}},
+        {"scenario": "ssp585"},
+        {"mechanisms": {"fire": False}},
+        {"constants": {"snow_albedo_old": 0.4}},
+        {"weather": "observed"},
+        {"initial_ranges": {"biomass_kgc_m2": (1.0, 2.0)}},
+        {"parameter_overrides": {"latitude_deg": 60.0}},
+        {"fixed_preference": 0.5},
+    ],
+    ids=lambda arguments: next(iter(arguments)),
+)
+def test_the_state_of_one_with_other_arguments_is_refused(arguments):
+    saved, env = quick(), quick(**arguments)
+    saved.reset(seed=1), env.reset(seed=2)
+    before = pickle.dumps(env.get_state())
+    with pytest.raises(ValueError, match="make both with the same arguments"):
+        env.set_state(saved.get_state())
+    assert pickle.dumps(env.get_state()) == before
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "value", "wrong"),
+    [
+        ("stands", "parameters", np.nan, "stands: parameters: finite numbers are allowed, got nan"),
+        ("stands", "parameters", 1e30, "latitude_deg = 1e.30 is outside its physical limits"),
+        ("stands", "state", np.inf, "stands: state: finite numbers are allowed, got inf"),
+        ("stands", "years", -1, r"stands: years: \[0, 1000\] is allowed, got -1"),
+        ("episodes", "weights", -1.0, r"episodes: weights: \[0, 1\] is allowed, got -1"),
+        ("episodes", "year", 99, r"episodes: year: \[0, \d\] is allowed, got 99"),
+    ],
+)
+def test_a_damaged_state_is_refused_and_nothing_of_it_taken(part, name, value, wrong):
+    env = quick()
+    env.reset(seed=1)
+    saved, before = env.get_state(), pickle.dumps(env.get_state())
+    (saved["episodes"]["stands"] if part == "stands" else saved["episodes"])[name][:] = value
+    with pytest.raises(ValueError, match=wrong):
+        env.set_state(saved)
+    assert pickle.dumps(env.get_state()) == before
+
+
+@pytest.mark.parametrize("generator", [None, {"bit_generator": "PCG64"}, {"bit_generator": "MT19937"}, 3])
+def test_a_state_without_its_generator_is_refused_and_nothing_of_it_taken(generator):
+    env, other = quick(), quick()
+    env.reset(seed=1), other.reset(seed=2)
+    saved, before = other.get_state(), pickle.dumps(env.get_state())
+    with pytest.raises(ValueError, match="generator"):
+        env.set_state({**saved, "generator": generator})
+    assert pickle.dumps(env.get_state()) == before
+
+
 def test_generators_of_fewer_stands_are_refused():
     envs = quick_vector(2)
     envs.reset(seed=1)

@@ -2,13 +2,15 @@
 
 import inspect
 from collections.abc import Sequence
+from dataclasses import asdict
 
 import numpy as np
 from gymnasium.spaces import Box
 
 import sim
 from sim.management import check_actions
-from sim.parameters import check_keys, check_name, check_seed
+from sim.parameters import check_name, check_overrides, check_seed
+from sim.saved import check_array, check_keys, check_settings
 from sim.spin_up import BOUNDARY, check_initial_ranges, middle_stocks
 from sim.task.actions import MaskFunction, mask_function, unchanged
 from sim.task.objectives import (
@@ -272,25 +274,38 @@ class Episodes:
 
     def get_state(self) -> dict:
         """All that the future depends on."""
-        state = {name: getattr(self, name).copy() for name in SAVED}
-        return {"mode": self.mode, "stands": self.stands.get_state(), **state}
+        arrays = {name: getattr(self, name).copy() for name in SAVED}
+        return {"settings": self._settings(), "stands": self.stands.get_state(), **arrays}
 
     def set_state(self, state: dict) -> None:
-        """Continue from `get_state`."""
-        check_keys("state of episodes", state, ("mode", "stands", *SAVED))
-        there, here = (
-            (mode, *history.shape, weights.shape[1])
-            for mode, history, weights in (
-                (state["mode"], state["history"], state["weights"]),
-                (self.mode, self.history, self.weights),
-            )
-        )
-        if there != here:
-            what = "mode, episodes, years, columns of the record, objectives"
-            raise ValueError(f"state of ({what}) {there} given to {here}")
+        """Continue from a `get_state` of one with the same arguments; ValueError, and nothing done, for any other."""
+        what = "state of episodes"
+        check_keys(what, state, ("settings", "stands", *SAVED))
+        check_settings(what, state["settings"], self._settings())
+        limits = {"weights": (0.0, 1.0), "year": (0, self.years)}
+        for name in SAVED:
+            low, high = limits.get(name, (-np.inf, np.inf))
+            check_array(f"{what}: {name}", state[name], getattr(self, name), low, high)
         self.stands.set_state(state["stands"])
         for name in SAVED:
             setattr(self, name, state[name].copy())
+
+    def _settings(self) -> dict:
+        """Arguments that a state belongs to, besides the stands', as plain values; functions by their names."""
+        timber = self.timber and {"prices": self.timber.prices, "discount_rate": self.timber.discount_rate}
+        return {
+            "mode": self.mode,
+            "years": self.years,
+            "thaw_formulation": self.thaw_formulation,
+            "fixed_preference": None if self.fixed_weights is None else np.asarray(self.fixed_weights).tolist(),
+            "site_seed": self.site_seed,
+            "parameter_overrides": check_overrides(self.parameter_overrides),
+            "initial_ranges": self.initial_ranges,
+            "reward": asdict(self.reward),
+            "objectives": self.objective_names,
+            "limits of objectives": [(o.name, o.low, o.high) for o in self.own_objectives],
+            "timber": timber,
+        }
 
 
 def check_groups(wanted, groups: Sequence[str]) -> tuple[str, ...]:
