@@ -60,8 +60,8 @@ class Args:
 
 
 if __name__ == "__main__":
-    require("pymoo", extra="planners")
     args = parse(Args)  # a bad flag is answered before all that follows is loaded
+    require("pymoo", extra="planners")
 
 import numpy as np
 import torch

@@ -52,6 +52,10 @@ def test_constant_plans_gain_there_what_they_gain():
 
 def test_a_short_training_has_none(tmp_path):
     assert make(steps=300_000, episodes=200).fits and not make(steps=100, episodes=200).fits
+    fifty_years = protocol.Task.of("boreal-generalist-v0")
+    trial = make(fifty_years, steps=32_000, episodes=20)
+    assert trial.fits and trial.shares == course.FEW_SHARES
+    assert make(fifty_years, steps=22_500, episodes=20).fits and not make(fifty_years, steps=22_499, episodes=20).fits
     run_script(
         "cleanrl_style/ppo_gated.py",
         *("--vectorization", "lockstep", "--num-envs", 4, "--rollout-steps", 200, "--total-timesteps", 200),

@@ -19,7 +19,8 @@ from cleanrl_style.protocol.sites import evaluation_seeds
 from cleanrl_style.protocol.task import Task
 
 SHARES = (0.05, 0.1, 0.2, 0.4, 0.7)  # of the training's steps, and at its end: all in all 9,000 years of stands
-LONGEST = 0.2  # share of a training's steps that its course may take in years of stands; shorter trainings have none
+FEW_SHARES = (0.2, 0.7)  # of a training too short for these: 4,500 years
+LONGEST = 0.2  # share of a training's steps that its course may take in years of stands; the shortest have none
 STANDS = 30  # that are played: of two objectives 10 sites at 3 weights. They fill two blocks of the evaluation's kernel
 
 
@@ -41,12 +42,20 @@ class Course:
         sites = 1 if one else min(STANDS // len(self.weights), episodes)
         self.seeds = evaluation_seeds(task, sites, "validation")
         self.columns = ("global_step", *weight_columns(task.objectives), *gain_columns(task.objectives))
+        self.shares = SHARES if self._fits(SHARES) else FEW_SHARES
 
     @property
     def fits(self) -> bool:
         """Whether the training is long enough to be worth its course."""
-        years = (len(SHARES) + 1) * len(self.seeds) * len(self.weights) * self.task.years
-        return years <= LONGEST * self.steps
+        return self._fits(self.shares)
+
+    @property
+    def years(self) -> int:
+        """Years of stands that it takes to play it once."""
+        return len(self.seeds) * len(self.weights) * self.task.years
+
+    def _fits(self, shares) -> bool:
+        return (len(shares) + 1) * self.years <= LONGEST * self.steps
 
     @property
     def lanes(self) -> set[int]:
@@ -61,7 +70,7 @@ class Course:
     def is_due(self, global_step: int, last: bool) -> bool:
         """Whether a share of the training has been reached since it was last asked, or the end."""
         before, self.done = self.done, global_step
-        return last or any(before < share * self.steps <= global_step for share in SHARES)
+        return last or any(before < share * self.steps <= global_step for share in self.shares)
 
     def play(self, policy) -> pd.DataFrame:
         """Mean gains of the greedy policy, a row a weight: the columns of validation.csv but the first."""

@@ -112,6 +112,7 @@ class Run:
         }
         self.envs, self.checkpoint, self.checkpoint_step = None, None, 0
         self.env_seconds, self.shown, self.course = 0.0, None, None
+        self.played_seconds = 0.0  # of a year and stand of the course
         with self._writing():
             self._claim_folder()
             self._load_checkpoint()
@@ -289,11 +290,12 @@ class Run:
         return self.shown
 
     def _seconds_of_evaluation(self, rate: float) -> float:
-        """What the evaluation will take, by the environments' own time or, before that is known, by the training's."""
+        """What the evaluation will take, by the last play of the course, which is like it, or by the training."""
         args = self.args
         episodes = len(args.eval_weights) * sum(episodes_by_policy(self.task, args.eval_episodes).values())
         steps = self.env_step - self.first_step
-        return episodes * (self.task.years or 0) * (self.env_seconds / steps if steps else 1 / rate)
+        of_a_step = self.env_seconds / steps if steps else 1 / rate
+        return episodes * (self.task.years or 0) * (self.played_seconds or of_a_step)
 
     def validate(self, global_step: int, last: bool, policy) -> None:
         """At some shares of the training and at its end: what the greedy policy gains on the validation sites.
@@ -305,6 +307,7 @@ class Run:
             return
         start = time.perf_counter()
         gained = self.course.play(policy)
+        self.played_seconds = (time.perf_counter() - start) / self.course.years
         for row in gained.to_dict("records"):
             self.log("validation", {"global_step": global_step, **row})
         if self.shown is not None:

@@ -1,5 +1,6 @@
 """What a run shows at its end: a short table per weight, and a picture."""
 
+import itertools
 import math
 from pathlib import Path
 
@@ -76,6 +77,8 @@ def print_score(objectives, comparison: Comparison) -> None:
     print(
         f"{'SCORE':>{label}}" + "".join(f"{value:>{WIDTH}}" for value in scores.values()) + "  % of the best constant"
     )
+    if np.allclose(table[PRIMARY], 0.0, atol=1e-6):
+        print(f"The {PRIMARY} policy gains what doing nothing does: it has learnt nothing yet")
     if len(table) > 1:
         print(followed(objectives, comparison))
     hypervolumes = (f"{name} {gain_hypervolume(comparison.gains[name]):.2f}" for name in POLICIES)
@@ -89,7 +92,7 @@ def print_course(course: Course, table: pd.DataFrame) -> None:
     """The score in the course of the training; table : validation.csv, empty of a script that does not play it."""
     if table.empty:
         return
-    scores = [f"{course.score(rows):.0f}" for _, rows in table.groupby("global_step")]
+    scores = [f"{course.score(rows):z.0f}" for _, rows in table.groupby("global_step")]
     shares = [f"{100 * step / course.steps:.0f}" for step in table.global_step.unique()]
     print(
         f"Course: score {', '.join(scores)} on {len(course.seeds)} validation sites after {', '.join(shares)} % of the "
@@ -138,7 +141,7 @@ def draw_summary(
     scores = (
         ""
         if comparison is None
-        else "\n" + ", ".join(f"{policy} score {comparison.score(policy):.0f}" for policy in POLICIES)
+        else "\n" + ", ".join(f"{policy} score {comparison.score(policy):z.0f}" for policy in POLICIES)
     )
     figure.suptitle(name + scores)
     axes = figure.subplots(rows, 2).ravel()
@@ -175,17 +178,19 @@ def _draw_gains(figure, ax, objectives, comparison: Comparison) -> None:
     for name, (style, label) in styles.items():
         ax.plot(x, means[name], style, markersize=5, label=label)
     zero = comparison.plans[comparison.plans.plan == NOTHING]
+    grey = itertools.cycle(["--", "-.", ":"])
     for plan, rows in comparison.plans.groupby("plan"):
         if not plan.isdigit():  # a fixed strategy, of the evaluation that ships
             table = at_weights(rows, comparison.weights, comparison.utility)
             gained = by_weight(gains(table, zero, comparison.utility)).scalarized_return.mean()
-            ax.plot(x, gained, "--", color="0.7", linewidth=0.8, label=plan.replace("_", " "))
+            style = next(grey)
+            ax.plot(x, gained, style, color="0.6", linewidth=0.9, label=plan.replace("_", " "))
     ax.axhline(0, color="black", linewidth=0.8)
     ax.annotate("doing nothing (0)", (0.02, 0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8)
     label = f"{objectives[0]} weight" if len(objectives) == 2 else "weight (number in the table)"
     ax.set(xlabel=label, ylabel="scalarized gain", title="evaluation, gain over doing nothing")
     ax.xaxis.get_major_locator().set_params(integer=len(objectives) != 2)
-    ax.legend(fontsize=7)
+    ax.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
 
 
 def _draw_course(axes, objectives, course: Course, table: pd.DataFrame) -> None:
@@ -249,7 +254,7 @@ def what_is_shown(table: pd.DataFrame) -> str:
 def _draw_trade_off(figure, ax, objectives, evaluation: pd.DataFrame) -> None:
     (first, second), what = objectives, what_is_shown(evaluation)
     returns = fronts.return_columns((second, first))
-    for policy, marker in (("sampled", "o"), ("greedy", "^")):
+    for policy, marker in (("greedy", "o"), ("sampled", "^")):
         means = evaluation[evaluation.policy == policy].groupby("preference")[returns].mean()
         points = ax.scatter(
             means[returns[0]],
