@@ -54,7 +54,7 @@ from analysis.exploring.stands import YEARS, Stand
 
 TITLE = "Two stands, one weather"
 PLANTED_CONIFERS = {"A": 1.0, "B": 0.0}  # at first, of a hundred a year
-PLAY_MS = 400  # a year that is watched
+BREATH_MS = 200  # between years that are watched, in which the page hears its buttons
 INTRODUCTION = (
     "Manage a boreal forest for fifty years: store carbon in trees, and keep the frozen ground below them cold. Stands "
     "A and B begin alike, on the same site, under the same weather and the same dice of fire, insects and death; what "
@@ -197,14 +197,22 @@ class Page:
         else:
             if self.alone.year == YEARS:
                 self.look(0)
-            self.clock = pn.state.add_periodic_callback(self.tick, period=PLAY_MS)
+            self.wait()
             self.buttons["Play"].label = "Pause"
+
+    def wait(self) -> None:
+        """Have the next year come, which begins only when the last is drawn: however slow that is, the page answers."""
+        self.clock = pn.state.add_periodic_callback(self.tick, period=BREATH_MS, count=1)
 
     def tick(self) -> None:
         """A year of those that are watched."""
+        if not self.clock:  # paused since it was called
+            return
         self.forward(1)
         if self.alone.year == YEARS:
             self.pause()
+        else:
+            self.wait()
 
     def pause(self) -> None:
         """Watch no further."""

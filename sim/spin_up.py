@@ -196,7 +196,7 @@ def drawn_stocks(dice: dict, given: dict, ranges: dict) -> dict[str, float]:
     stocks.update(given)
     classes = [stocks[name] for name in CLASS_NAMES if name in stocks]
     density = sum(classes) if classes else stocks["density_stems_ha"]
-    if "biomass_kgc_m2" not in given and density > 0.0:
+    if "biomass_kgc_m2" not in given:
         held = density * LARGEST_STEM_KGC * 1e-4
         low, high = (min(end, held) for end in ranges["biomass_kgc_m2"])
         stocks["biomass_kgc_m2"] = low + (high - low) * dice["biomass_kgc_m2"]

@@ -7,6 +7,7 @@ import torch
 from scripts import ROOT, run_script
 
 from cleanrl_style import protocol
+from cleanrl_style.flags import policy_file
 
 TOY = "toy_env:toy-v0"
 SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
@@ -68,3 +69,28 @@ def test_a_policy_whose_training_went_wrong_is_refused(tmp_path):
 def test_a_folder_without_a_policy_is_named(tmp_path):
     with pytest.raises(FileNotFoundError, match="neither the folder of a finished run, with policy.pt"):
         protocol.load_policy(tmp_path)
+
+
+def test_a_file_that_was_cut_short_is_named(tmp_path):
+    path = tmp_path / "cut.pt"
+    path.write_bytes(policy_file("ppo_group").read_bytes()[:5000])
+    with pytest.raises(ValueError, match="cut.pt: cut short or not readable"):
+        protocol.load_policy(path)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"observation_shape": None},
+        {"observation_shape": [5, 21]},
+        {"run": {"script": "ppo_group", "arguments": {}}},
+        {"run": {"script": "ppo_group", "arguments": None}},
+        {"run": {"script": "ppo_group", "arguments": {"env_id": "boreal-generalist-v0", "eval_weights": []}}},
+    ],
+    ids=str,
+)
+def test_a_file_that_no_script_has_written_is_named(damage, tmp_path):
+    saved = torch.load(policy_file("ppo_group"), weights_only=True)
+    torch.save({**saved, **damage}, tmp_path / "policy.pt")
+    with pytest.raises(ValueError, match="policy.pt: no policy that a script of this project has written"):
+        protocol.load_policy(tmp_path / "policy.pt")

@@ -83,7 +83,7 @@ def load_policy(run_or_name, script=None) -> Policy:
     try:
         saved = torch.load(path, weights_only=True)
         run = saved.get("run") or json.loads((path.parent / "config.json").read_text(encoding="utf-8"))
-        saved["agent"], saved["arguments"], saved["observation_shape"], run["script"], run["arguments"]
+        _check_run(saved, run)
     except (
         pickle.UnpicklingError,
         EOFError,
@@ -96,6 +96,8 @@ def load_policy(run_or_name, script=None) -> Policy:
         raise ValueError(f"{path}: no policy that a script of this project has written") from error
     except FileNotFoundError as error:
         raise FileNotFoundError(f"{path}: config.json of its run has to lie beside it") from error
+    except OSError as error:  # a file that was cut short is no file to torch
+        raise ValueError(f"{path}: cut short or not readable ({error.strerror})") from error
     module = _script_module(run["script"], script)
     space = Box(-np.inf, np.inf, tuple(saved["observation_shape"]), np.float32)
     lacking = [part for part in ("Agent", "make_policy") if not hasattr(module, part)]
@@ -115,6 +117,15 @@ def load_policy(run_or_name, script=None) -> Policy:
     unknown = np.full((1, _objectives(run["arguments"])), np.nan)
     looks_back = bool(np.isnan(probabilities(np.zeros((1, size), np.float32), np.ones((1, 25), bool), unknown)).any())
     return Policy(str(run_or_name), run["script"], run["arguments"], probabilities, size, looks_back)
+
+
+def _check_run(saved: dict, run: dict) -> None:
+    """Raise an error, whichever, where what a script writes with a policy is lacking or of another kind."""
+    (size,), weights = saved["observation_shape"], run["arguments"].get("eval_weights", [0.0])
+    if not isinstance(saved["agent"], dict) or not isinstance(saved["arguments"], dict) or size < 1:
+        raise TypeError("no policy")
+    if not isinstance(run["script"], str) or not isinstance(run["arguments"]["env_id"], str) or not len(weights):
+        raise TypeError("no run")
 
 
 def _objectives(arguments: dict) -> int:
