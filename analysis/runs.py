@@ -118,11 +118,16 @@ def read_whole(folder: Path, trained: bool) -> dict[str, pd.DataFrame]:
             continue  # its environment keeps no annual record or is not ours; the run is ours
         if not path.exists():
             raise ValueError(f"{'unfinished' if name == 'evaluation' else 'partial'}: it has no {name}.csv")
-        try:
-            tables[name] = pd.read_csv(path)
-        except (ValueError, OSError) as error:
-            raise ValueError(f"damaged: {path.name} ({error})") from error
+        tables[name] = read_table(path)
     return tables
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """A table of a run; ValueError names the file that cannot be read."""
+    try:
+        return pd.read_csv(path)
+    except (ValueError, OSError) as error:
+        raise ValueError(f"damaged: {path.name} ({' '.join(str(error).split())})") from error
 
 
 def read_config(folder: Path) -> dict:
@@ -169,8 +174,12 @@ def check(evaluation: pd.DataFrame, config: dict) -> None:
         raise ValueError(
             f"damaged: evaluation.csv has {len(evaluation)} episodes of the {primary} policy, not {expected}"
         )
-    if not np.isfinite(evaluation[fronts.return_columns(objectives)].to_numpy(dtype=float)).all():
-        raise ValueError("damaged: evaluation.csv has returns that are not finite numbers")
+    for what, columns in (
+        ("weights", fronts.weight_columns(objectives)),
+        ("returns", fronts.return_columns(objectives)),
+    ):
+        if not np.isfinite(evaluation[columns].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)).all():
+            raise ValueError(f"damaged: evaluation.csv has {what} that are not finite numbers")
 
 
 def of_another_physics(runs: list[Run]) -> list[Run]:

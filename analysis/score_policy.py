@@ -20,6 +20,7 @@ PAGE, TABLE = Path("docs", "leaderboard.md"), Path("docs", "leaderboard.csv")
 SECTION = re.compile(r"(<!-- leaderboard -->\n).*?(<!-- end of leaderboard -->)", re.DOTALL)
 SITES = 200  # of the test split
 CHECKED = 8  # episodes a weight that are played again
+SUBMITTED = ("config.json", "policy.pt", "evaluation.csv")  # what a run's folder is handed in with
 
 
 @dataclass
@@ -61,6 +62,9 @@ def check_flags(args: Args) -> None:
         policy_file(args.policy)
     except FileNotFoundError as error:
         fail(str(error))
+    missing = [name for name in SUBMITTED if args.policy.is_dir() and not (args.policy / name).is_file()]
+    if missing:
+        fail(f"{args.policy}: it has no {missing[0]}; a run's folder has {', '.join(SUBMITTED)}")
 
 
 if __name__ == "__main__":
@@ -70,6 +74,7 @@ if __name__ == "__main__":
 import numpy as np
 import pandas as pd
 
+from analysis import runs
 from analysis.excerpts import markdown
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts, reference, score
@@ -80,11 +85,24 @@ SCORES = tuple(f"{policy}, {task}" for task in TASKS for policy in protocol.POLI
 COLUMNS = ("name", "script", "trained on", "steps", *SCORES)
 
 
+def evaluation_of(folder: Path) -> pd.DataFrame:
+    """The evaluation of a run's folder; ValueError names the file of it that is damaged."""
+    try:
+        config = runs.read_config(folder)
+        written = runs.read_table(folder / "evaluation.csv")
+        runs.check(written, config)
+        if "episode" not in written or not pd.api.types.is_numeric_dtype(written.episode):
+            raise ValueError("damaged: evaluation.csv lacks the column episode, of numbers")
+    except ValueError as error:
+        raise ValueError(f"{folder}: {error}") from error
+    return written
+
+
 def check(policy: protocol.Policy, folder: Path) -> str:
     """Play the beginning of a run's evaluation again; ValueError if it went otherwise."""
-    if not (folder / "evaluation.csv").is_file():
+    if not folder.is_dir():
         return "a policy file alone: nothing to check it against"
-    written = pd.read_csv(folder / "evaluation.csv")
+    written = evaluation_of(folder)
     written = written[written.episode < CHECKED].reset_index(drop=True)
     weights = np.unique(fronts.weights_of(written), axis=0)
     again, _ = protocol.evaluate(policy.task(), policy.probabilities, weights, int(written.episode.max()) + 1)

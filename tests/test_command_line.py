@@ -127,6 +127,37 @@ def test_a_policy_that_does_not_play_its_evaluation_is_refused(run, tmp_path):
 
 
 @pytest.mark.parametrize(
+    "name, text, message",
+    [
+        ("config.json", None, "it has no config.json; a run's folder has config.json, policy.pt, evaluation.csv$"),
+        (
+            "evaluation.csv",
+            None,
+            "it has no evaluation.csv; a run's folder has config.json, policy.pt, evaluation.csv$",
+        ),
+        ("config.json", "", r"damaged: config.json \("),
+        ("config.json", "{}", r"damaged: config.json \(KeyError\('script'\)\)$"),
+        ("evaluation.csv", "", r"damaged: evaluation.csv \(No columns to parse from file\)$"),
+        ("evaluation.csv", "HEADER", "damaged: evaluation.csv has 0 episodes of the greedy policy, not 5$"),
+        ("evaluation.csv", "a,b\n1,2\n", "damaged: evaluation.csv with the returns of .* lacks the column policy$"),
+        ("evaluation.csv", "a\n1,2\n1,2,3\n", r"damaged: evaluation.csv \(Error tokenizing"),
+    ],
+)
+def test_a_damaged_file_of_a_submitted_run_is_named(run, tmp_path, name, text, message):
+    for one in score_policy.SUBMITTED:
+        (tmp_path / one).write_bytes((run / one).read_bytes())
+    (tmp_path / name).unlink()
+    if text is not None:
+        header = (run / name).read_text().splitlines()[0]
+        (tmp_path / name).write_text(text.replace("HEADER", header))
+    args = score_policy.Args(tmp_path, tasks=("boreal-site-specific-v0",), episodes=1)
+    with pytest.raises(SystemExit, match=message) as refused:
+        score_policy.check_flags(args)
+        score_policy.main(args)
+    assert str(refused.value).startswith(f"error: {tmp_path}: ") and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
     "given, message",
     [
         (("nobody",), "nobody: neither the folder of a finished run"),
