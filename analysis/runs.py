@@ -152,6 +152,8 @@ def read_run(folder: Path) -> Run:
     steps = config["arguments"].get("total_timesteps")
     tables = read_whole(folder, steps is not None)
     check(tables["evaluation"], config)
+    if steps is not None:
+        check_training(tables, config["arguments"])
     try:
         return Run(folder, config, reduction.reduce(tables, steps, primary_of(config)))
     except (KeyError, TypeError) as error:
@@ -182,14 +184,27 @@ def check(evaluation: pd.DataFrame, config: dict) -> None:
             raise ValueError(f"damaged: evaluation.csv has {what} that are not finite numbers")
 
 
+def check_training(tables: dict[str, pd.DataFrame], arguments: dict) -> None:
+    """ValueError if the log of a finished training ends before half of its steps: the file was cut short."""
+    episodes, steps, years = tables["episodes"], arguments["total_timesteps"], tables.get("evaluation_years")
+    if years is None or not {"global_step", "env"} <= {*episodes} or "year" not in years:
+        return  # how long its episodes are is not known, or the lacking column is named later
+    first_end = max(arguments.get("num_envs") or 1, episodes.env.nunique()) * years.year.max()
+    last = 0 if episodes.empty else episodes.global_step.max()
+    if first_end <= steps and not last >= steps / 2:  # a search by generations may end with half of its steps left
+        raise ValueError(f"damaged: episodes.csv ends at step {last} of {steps}")
+
+
 def of_another_physics(runs: list[Run]) -> list[Run]:
     """Those that another simulator or environment than this checkout's has made; older runs do not say which."""
     return [run for run in runs if run.config.get("physics", physics_name()) != physics_name()]
 
 
-def run_folders(root: Path) -> list[Path]:
-    """Folders below `root` that hold a config.json, in order; those of `reproduce.py --quick` only if asked for."""
-    folders = sorted(path.parent for path in root.rglob("config.json"))
+def run_folders(root: Path, *files: str) -> list[Path]:
+    """Folders below `root` that hold one of the files, config.json if none is named, in order; those of
+    `reproduce.py --quick` only if asked for.
+    """
+    folders = sorted({path.parent for name in files or ("config.json",) for path in root.rglob(name)})
     return [folder for folder in folders if folder.relative_to(root).parts[:1] != (paths.QUICK,)]
 
 
@@ -200,7 +215,10 @@ def read_runs(*roots: Path) -> tuple[list[Run], list[str]]:
     """
     runs, left_out, seen = [], [], {}
     for root in roots:
-        for folder in run_folders(root):
+        with_config = run_folders(root)
+        nameless = sorted({*run_folders(root, "evaluation.csv", ARCHIVED)} - {*with_config})
+        left_out += [f"{folder}: damaged: it has no config.json" for folder in nameless]
+        for folder in with_config:
             try:
                 run = read_run(folder)
             except ValueError as error:

@@ -293,6 +293,23 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
         assert sum(str(runs / name) + ":" in line and reason in line for line in lines) == 1, name
 
 
+def test_a_log_that_was_cut_short_and_a_run_without_config_are_named(tmp_path, capsys):
+    runs = tmp_path / "runs"
+    for name in ("good", "cut", "header", "no-config"):
+        write_run(runs / name, "ppo_curriculum", seed=len(name) + 20)
+    write_run(runs / "short", "ppo_curriculum", total_timesteps=40, num_envs=32)  # ended before its first episode did
+    for name, rows in (("cut", 1), ("header", 0), ("short", 0)):
+        file = runs / name / "episodes.csv"
+        pd.read_csv(file).iloc[:rows].to_csv(file, index=False)
+    (runs / "no-config" / "config.json").unlink()
+    make(runs, tmp_path / "tables")
+    assert sorted(capsys.readouterr().err.splitlines()) == [
+        f"left out: {runs}/cut: damaged: episodes.csv ends at step 75000 of 300000",
+        f"left out: {runs}/header: damaged: episodes.csv ends at step 0 of 300000",
+        f"left out: {runs}/no-config: damaged: it has no config.json",
+    ]
+
+
 def test_the_same_run_in_two_folders_counts_once(tmp_path, capsys):
     for name in ("runs", "archive"):
         shutil.copytree(TINY_RUNS / "curriculum", tmp_path / name / "curriculum")
