@@ -21,7 +21,11 @@ def end_with_input() -> None:
 
 
 if __name__ == "__main__":
-    core, *sys.argv = sys.argv[1:]
+    given = sys.argv[1:]
+    if len(given) < 2 or not (given[0] == "any" or given[0].isdecimal()) or not Path(given[1]).is_file():
+        got = " ".join(given) or "nothing"
+        sys.exit(f"error: CORE SCRIPT ARGUMENTS are allowed, a core's number or any and a Python file, got {got}")
+    core, *sys.argv = given
     sys.path[0] = str(Path(sys.argv[0]).resolve().parent)
     if core != "any":
         os.sched_setaffinity(0, {int(core)})

@@ -109,3 +109,11 @@ def test_a_script_ends_with_its_parent(fake):
             return
         time.sleep(0.05)
     pytest.fail("the script outlives who started it")
+
+
+@pytest.mark.parametrize("given", [[], ["--nonsense"], ["any", "nowhere.py"], ["first", __file__]])
+def test_a_tied_script_is_asked_for_in_one_line(given):
+    said = subprocess.run([sys.executable, "-m", "analysis.tied", *given], capture_output=True, text=True, cwd=ROOT)
+    got = " ".join(given) or "nothing"
+    wanted = f"CORE SCRIPT ARGUMENTS are allowed, a core's number or any and a Python file, got {got}"
+    assert said.returncode == 1 and said.stderr == f"error: {wanted}\n"
