@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
@@ -90,6 +91,8 @@ def test_a_policy_is_watched(shipped, tmp_path, capsys, monkeypatch):
         (["watch", "{run}", "--env-id", "boreal-balanced-v0"], "observes 43 entries, boreal-balanced-v0 has 105"),
         (["watch", "{run}", "--env-id", "boral-v0"], "boral"),
         (["watch", "{run}", "--out", "/nowhere/years.gif"], "--out /nowhere/years.gif: there is no folder /nowhere"),
+        (["watch", "{run}", "--out", "/proc/years.gif"], "--out /proc/years.gif: (cannot write|there is no folder)"),
+        (["watch", "{run}", "--window"], "--window: matplotlib finds no display here; without it a GIF is written"),
         (["watch", "{run}", "--out", "years.mp4"], r"--out years.mp4: a file that ends in .gif is allowed"),
         (["watch", "{run}", "--site-seed", "-1"], r"--site-seed: an integer in \[0, 2\^63\) is allowed, got -1"),
         (["watch", "{run}", "--script", "x.md"], "--script x.md: a file that ends in .py, and is there, is allowed"),
@@ -98,10 +101,19 @@ def test_a_policy_is_watched(shipped, tmp_path, capsys, monkeypatch):
         (["wach"], "invalid choice: 'wach'"),
     ],
 )
-def test_a_bad_command_gets_one_line(run, given, message):
+def test_a_bad_command_gets_one_line(run, given, message, monkeypatch):
+    monkeypatch.setattr(command_line, "play", None)  # nothing is played for it
+    matplotlib.use("agg")  # as where there is no display
     with pytest.raises(SystemExit, match=message) as refused:
         command_line.main([word.format(run=run) for word in given])
     assert "\n" not in str(refused.value)
+
+
+def test_a_script_with_a_syntax_error_is_named_by_its_line(run, tmp_path):
+    script = tmp_path / "syn.py"
+    script.write_text("import torch\n\nclass Agent(:\n    pass\n")
+    with pytest.raises(SystemExit, match=rf"^error: script {script}, line 3: invalid syntax$"):
+        command_line.main(["watch", str(run), "--script", str(script)])
 
 
 def test_a_run_is_checked_and_scored(run, capsys):

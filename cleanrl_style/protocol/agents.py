@@ -146,5 +146,8 @@ def _script_module(name: str, path) -> ModuleType:
     if spec is None or not Path(path).exists():
         raise FileNotFoundError(f"script {path}: no Python file")
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except SyntaxError as error:
+        raise ValueError(f"script {error.filename}, line {error.lineno}: {error.msg}") from error
     return module

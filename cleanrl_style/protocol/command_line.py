@@ -6,6 +6,7 @@ python -m boreal_env watch ppo_group --preference 0.3 --site-seed 7
 
 import argparse
 import sys
+import tempfile
 from pathlib import Path
 
 import gymnasium as gym
@@ -92,6 +93,36 @@ def check(args: argparse.Namespace) -> None:
         raise ValueError(f"--out {args.out}: there is no folder {args.out.parent}")
     if args.out is not None and args.out.suffix.lower() != ".gif":
         raise ValueError(f"--out {args.out}: a file that ends in .gif is allowed")
+    if args.window:
+        check_display()
+    else:
+        check_writable(args.out)
+
+
+def check_display() -> None:
+    """Refuse a window where there is none to be had, before years are played for it."""
+    import matplotlib.pyplot as plt
+
+    try:
+        plt.switch_backend(plt.get_backend())
+        found = plt.get_backend().lower() != "agg"
+    except ImportError:
+        found = False
+    if not found:
+        raise ValueError("--window: matplotlib finds no display here; without it a GIF is written")
+
+
+def check_writable(out: Path | None) -> None:
+    """Refuse a place where the GIF cannot be written, before years are played for it."""
+    if out is not None and out.is_dir():
+        raise ValueError(f"--out {out}: it is a folder; a file that ends in .gif is allowed")
+    folder = Path() if out is None else out.absolute().parent
+    try:
+        with tempfile.NamedTemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        what = f"the working folder {folder.absolute()}" if out is None else out
+        raise ValueError(f"--out {what}: cannot write there ({error.strerror})") from error
 
 
 def check_preference(given: list[float] | None, objectives: int) -> np.ndarray:
@@ -148,8 +179,6 @@ def show(frames: list[np.ndarray]) -> None:
     import matplotlib.pyplot as plt
 
     figure, ax = plt.subplots(figsize=(8, 5), num="BoreaRL")
-    if plt.get_backend().lower() == "agg":
-        raise ValueError("--window: matplotlib finds no display here; without it a GIF is written")
     figure.subplots_adjust(0, 0, 1, 1)
     ax.set_axis_off()
     picture = ax.imshow(frames[0])
