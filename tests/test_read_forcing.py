@@ -533,6 +533,30 @@ def test_a_file_that_is_not_utf8_is_refused_by_its_line(tmp_path):
         sim.read_forcing(tmp_path / "tower.csv", **ALASKA)
 
 
+@pytest.mark.parametrize("name", ["tower.csv.gz", "tower.nc"])
+def test_a_file_that_is_not_what_its_name_says_is_named_in_one_line(tmp_path, name):
+    if name.endswith(".nc"):
+        pytest.importorskip("xarray")
+    (tmp_path / name).write_text("TIMESTAMP,TA_F\n")
+    with pytest.raises(ValueError, match=rf"^forcing: {name}: (no NetCDF file|it cannot be unpacked)") as refused:
+        sim.read_forcing(tmp_path / name, **ALASKA)
+    assert "\n" not in str(refused.value)
+
+
+def test_half_a_packed_file_is_refused(tmp_path):
+    path = tmp_path / "tower.csv.gz"
+    records.fluxnet(10).to_csv(path, index=False)
+    path.write_bytes(path.read_bytes()[:-2000])
+    with pytest.raises(ValueError, match="^forcing: tower.csv.gz: it cannot be unpacked"):
+        sim.read_forcing(path, **SWEDEN)
+
+
+def test_a_column_twice_in_memory_is_refused():
+    table = records.fluxnet(10)
+    with pytest.raises(ValueError, match="^forcing: the table: column TA_F is there twice$"):
+        sim.read_forcing(pd.concat([table, table[["TA_F"]]], axis=1), **SWEDEN)
+
+
 def test_another_kind_of_file_is_refused(tmp_path):
     (tmp_path / "tower.zip").write_bytes(b"PK")
     with pytest.raises(ValueError, match=r"tower.zip: a CSV \(also .gz\) or NetCDF file|unpack or export"):

@@ -1,6 +1,7 @@
 """The rows of a record, from a file or from memory, and how an error names one of them."""
 
 import gzip
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,7 +52,14 @@ def open_table(source) -> Table:
     if path.suffix in (".nc", ".nc4", ".netcdf"):
         from sim.io.dataset import import_xarray
 
-        with import_xarray("a NetCDF file").open_dataset(path) as dataset:
+        xarray = import_xarray("a NetCDF file")
+        try:
+            opened = xarray.open_dataset(path)
+        except (ValueError, OSError, RuntimeError) as error:
+            raise ValueError(
+                f"forcing: {path.name}: no NetCDF file, or netCDF4 or h5netcdf is not installed, which read it"
+            ) from error
+        with opened as dataset:
             return _in_memory(_of_one_place(dataset, path.name), path.name)
     if path.suffix in (".zip", ".xlsx", ".xls", ".grib"):
         raise ValueError(
@@ -62,7 +70,14 @@ def open_table(source) -> Table:
 
 
 def check_utf8(what: str, path: Path) -> None:
-    """Refuse a text file that is not UTF-8, by its line. what : how the error begins."""
+    """Refuse a text file that is not UTF-8, by its line, or that cannot be unpacked. what : how the error begins."""
+    if path.suffix == ".gz":
+        try:
+            with gzip.open(path, "rb") as packed:
+                while packed.read(2**20):
+                    pass
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise ValueError(f"{what}: it cannot be unpacked ({error}); a whole gzip file is allowed") from error
     with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as file:
         for number, line in enumerate(file, start=1):
             try:
@@ -127,6 +142,9 @@ def _in_memory(frame: pd.DataFrame, name: str) -> Table:
         frame = frame.reset_index(names="time" if frame.index.name is None and frame.index.nlevels == 1 else None)
     frame = frame.reset_index(drop=True)
     columns = [str(column) for column in frame.columns]
+    twice = [name for k, name in enumerate(columns) if name in columns[:k]]
+    if twice:
+        raise ValueError(f"forcing: {name}: column {twice[0]} is there twice")
     return Table(name, columns, lambda names: frame.set_axis(columns, axis=1)[names])
 
 
