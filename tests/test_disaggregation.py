@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import sim
 from sim.io import disaggregation
 from sim.io.disaggregation import DiurnalCycle, diurnal_cycle, half_hours
 
@@ -94,3 +95,52 @@ def test_a_gap_and_an_impossible_deficit_name_column_and_day(daily):
     dry.loc["2012-01-05", "vapour_pressure_deficit_hpa"] = 9.0
     with pytest.raises(ValueError, match="9 hPa on 2012-01-05 is too large"):
         half_hours(dry, LATITUDE, CYCLE)
+
+
+def test_relative_humidity_is_that_of_the_days_temperature(daily):
+    by_share = daily.drop(columns="vapour_pressure_deficit_hpa").assign(relative_humidity=0.8)
+    by_pressure = by_share.assign(vapour_pressure_hpa=0.8 * saturation(daily.air_temperature_c))
+    expected = half_hours(by_pressure.drop(columns="relative_humidity"), LATITUDE, CYCLE)
+    pd.testing.assert_frame_equal(half_hours(by_share, LATITUDE, CYCLE), expected)
+
+
+def test_days_in_the_columns_of_a_forcing_are_simulated_as_its_error_advises(daily):
+    forcing = daily.drop(columns="vapour_pressure_deficit_hpa").assign(relative_humidity=0.8)
+    with pytest.raises(ValueError, match=r"sim.half_hours\(forcing, latitude_deg\) makes half-hours of it"):
+        sim.simulate(forcing=forcing)
+    table = sim.simulate({"latitude_deg": LATITUDE}, forcing=sim.half_hours(forcing, LATITUDE), time_step_minutes=120)
+    assert table.precipitation_mm.tolist() == pytest.approx([forcing.precipitation_mm.drop("2012-02-29").sum()])
+
+
+@pytest.mark.parametrize(
+    ("change", "latitude", "message"),
+    [
+        (lambda daily: None, LATITUDE, "daily record: a DataFrame with a DatetimeIndex is allowed"),
+        (lambda daily: daily, 100, r"latitude_deg = 100: a number in \[.*\] is allowed"),
+        (lambda daily: daily, None, r"latitude_deg = None: a number in \[.*\] is allowed"),
+        (
+            lambda daily: daily.set_axis(pd.date_range("2012-01-01", periods=len(daily), freq="h")),
+            LATITUDE,
+            "daily record: zero-based row 1 is of 2012-01-01 01:00:00; one row a day, at 00:00 and in order, is .*",
+        ),
+        (
+            lambda daily: daily.drop(columns="vapour_pressure_deficit_hpa"),
+            LATITUDE,
+            "daily record: column relative_humidity is missing; needed: air_temperature_c, .*, vapour_pressure_hpa or "
+            "vapour_pressure_deficit_hpa does too",
+        ),
+        (
+            lambda daily: daily.drop(columns="vapour_pressure_deficit_hpa").assign(relative_humidity=70.0),
+            LATITUDE,
+            r"daily record: relative_humidity is 70 on 2012-01-01; \[0, 1.1\] is allowed \(is it in percent\?\)",
+        ),
+        (
+            lambda daily: daily.assign(wind_speed_m_s="calm"),
+            LATITUDE,
+            "daily record: wind_speed_m_s has type .*; numbers are allowed",
+        ),
+    ],
+)
+def test_what_is_no_daily_record_is_refused_in_one_line(daily, change, latitude, message):
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        half_hours(change(daily), latitude)

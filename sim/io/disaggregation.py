@@ -12,11 +12,15 @@ import numpy as np
 import pandas as pd
 
 from sim.jit import uncompiled
+from sim.parameters import SITE_PARAMETERS
+from sim.state import FORCING
 from sim.weather import saturation_pressure_water, solar_declination
 
 saturation_water = uncompiled(saturation_pressure_water)
 declination = uncompiled(solar_declination)
 
+#: What a daily record may have its humidity as; the first that is there is taken.
+HUMIDITY = ("vapour_pressure_hpa", "vapour_pressure_deficit_hpa", "relative_humidity")
 STEPS_PER_DAY = 48
 HOURS = (np.arange(STEPS_PER_DAY) + 0.5) * 24.0 / STEPS_PER_DAY  # local solar time at the middle of each step
 
@@ -51,14 +55,16 @@ def diurnal_cycle(air: pd.Series, shortwave: pd.Series) -> DiurnalCycle:
 def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = FOREST_CYCLE) -> pd.DataFrame:
     """Half-hourly forcing of the simulator (`sim.state.FORCING`) from daily means, indexed by solar time.
 
-    daily : a row a day, indexed by date, with air_temperature_c, vapour_pressure_deficit_hpa (mean over the day) or
-    vapour_pressure_hpa, wind_speed_m_s, shortwave_w_m2, longwave_w_m2,
-    precipitation_mm (sum). 29 February is dropped.
+    daily : a row a day, indexed by date, with air_temperature_c, one of vapour_pressure_hpa,
+    vapour_pressure_deficit_hpa (mean over the day) and relative_humidity (at the day's mean temperature), the first of
+    them that is there, wind_speed_m_s, shortwave_w_m2, longwave_w_m2, precipitation_mm (sum). 29 February is dropped.
 
     Shortwave of a day whose sun does not rise is spread evenly, so that the mean stays. Relative humidity is over
     water and at most 1: vapour beyond that, on cold nights, is dew. Raises ValueError, naming column and day, for a
-    gap, and for a deficit larger than the day's saturation pressure.
+    gap, and for a deficit larger than the day's saturation pressure; and for what is no daily table of a place.
     """
+    columns = _check_daily(daily, latitude_deg)
+    daily = daily[columns]
     daily = daily[~((daily.index.month == 2) & (daily.index.day == 29))]
     for name in daily:
         missing = daily.index[daily[name].isna()]
@@ -72,6 +78,8 @@ def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = F
     saturation = np.vectorize(saturation_water)(air)
     if "vapour_pressure_hpa" in mean:
         vapour = mean["vapour_pressure_hpa"]
+    elif "relative_humidity" in mean:
+        vapour = mean["relative_humidity"] * np.vectorize(saturation_water)(mean["air_temperature_c"])
     else:
         vapour = saturation.mean(axis=1, keepdims=True) - mean["vapour_pressure_deficit_hpa"]
         if (vapour <= 0.0).any():
@@ -81,7 +89,7 @@ def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = F
                 f"daily record: a vapour pressure deficit of {deficit:g} hPa on {day:%Y-%m-%d} is too large"
             )
     shape = sun_shape(daily.index, latitude_deg)
-    columns = {
+    values = {
         "air_temperature_c": air,
         "relative_humidity": np.minimum(vapour / saturation, 1.0),
         "wind_speed_m_s": mean["wind_speed_m_s"] * even,
@@ -91,7 +99,42 @@ def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = F
     }
     steps = pd.to_timedelta(np.arange(STEPS_PER_DAY) * 24.0 / STEPS_PER_DAY, unit="h")
     index = pd.DatetimeIndex(np.concatenate([day + steps for day in daily.index]), name="time")
-    return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+    return pd.DataFrame({name: one.ravel() for name, one in values.items()}, index=index)
+
+
+def _check_daily(daily, latitude_deg) -> list[str]:
+    """The columns of a daily table that are used; ValueError for what is none, or for a latitude that is none."""
+    if not isinstance(daily, pd.DataFrame) or not isinstance(daily.index, pd.DatetimeIndex):
+        raise ValueError("daily record: a DataFrame with a DatetimeIndex is allowed")
+    latitude = SITE_PARAMETERS["latitude_deg"]
+    low, high, number = latitude.physical_low, latitude.physical_high, (int, float, np.number)
+    if isinstance(latitude_deg, bool) or not isinstance(latitude_deg, number) or not low <= latitude_deg <= high:
+        raise ValueError(f"latitude_deg = {latitude_deg!r}: a number in [{low:g}, {high:g}] is allowed")
+    index = daily.index
+    wrong = index.isna() | (index != index.normalize())
+    wrong[1:] |= index[1:] <= index[:-1]
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ValueError(
+            f"daily record: zero-based row {row} is of {index[row]}; one row a day, at 00:00 and in order, is allowed"
+        )
+    humidity = [name for name in HUMIDITY if name in daily][:1]
+    columns = [name for name in FORCING if name != "relative_humidity"] + (humidity or [HUMIDITY[-1]])
+    for name in columns:
+        if name not in daily:
+            either = f"; of the last, {' or '.join(HUMIDITY[:-1])} does too" if name in HUMIDITY else ""
+            raise ValueError(f"daily record: column {name} is missing; needed: {', '.join(columns)}{either}")
+        if list(daily.columns).count(name) > 1:
+            raise ValueError(f"daily record: column {name} is there twice")
+        if daily[name].dtype.kind not in "iuf":
+            raise ValueError(f"daily record: {name} has type {daily[name].dtype}; numbers are allowed")
+    if "relative_humidity" in columns and not (beyond := daily["relative_humidity"]).dropna().between(0.0, 1.1).all():
+        day = daily.index[(beyond < 0.0) | (beyond > 1.1)][0]
+        raise ValueError(
+            f"daily record: relative_humidity is {beyond[day]:g} on {day:%Y-%m-%d}; [0, 1.1] is allowed (is it in "
+            "percent?)"
+        )
+    return columns
 
 
 def sun_shape(days: pd.DatetimeIndex, latitude_deg: float) -> np.ndarray:
