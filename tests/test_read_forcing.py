@@ -484,7 +484,7 @@ def test_rain_may_be_a_rate(unit, factor):
 
 def test_rain_by_the_day_is_refused_of_a_forcing_of_ones_own(weather):
     with pytest.raises(
-        ValueError, match=r"precipitation_mm is 3.5e\+04 mm a year; at most 5000 is allowed .*30 minutes"
+        ValueError, match=r"precipitation_mm is 3.5e\+04 mm a year in 2019; .* 5000\] is allowed .*30 minutes"
     ):
         check_forcing(weather.assign(precipitation_mm=2.0), 30, 1)
 

@@ -462,7 +462,41 @@ FORCINGS = {
         r"not regular at 2020-03-01",
     ),
     "duplicate times": (lambda: pd.concat([observed().iloc[:1]] * 6), r"2019-01-01 00:00"),
-    "descending times": (lambda: observed(10).iloc[::-1], r"forcing"),
+    "descending times": (
+        lambda: observed(10).iloc[::-1],
+        r"its times are not sorted, or twice: .* of zero-based row 1 ",
+    ),
+    "shuffled times": (
+        lambda: observed(10).iloc[[0, 40, 3, *range(4, 30)]],
+        r"not sorted, or twice: 2019-01-01 12:00:00 of zero-based row 2 follows 2019-01-07 16:00:00$",
+    ),
+    "a time missing": (
+        lambda: observed(10).set_axis(observed(10).index.where(np.arange(60) != 1)),
+        r"^forcing: the time of zero-based row 1 is missing$",
+    ),
+    "a column twice": (
+        lambda: pd.concat([observed(), observed()[["wind_speed_m_s"]]], axis=1),
+        r"^forcing: column wind_speed_m_s is there twice$",
+    ),
+    "light in MJ": (
+        lambda: observed().assign(shortwave_w_m2=lambda table: 0.0036 * table.shortwave_w_m2),
+        r"shortwave_w_m2 is 0.\d+ W m-2 on a clear summer day in 2019; at least 50 is allowed \(is it in MJ m-2\?\)",
+    ),
+    "no light": (lambda: observed(shortwave_w_m2=0.0), r"shortwave_w_m2 is 0 W m-2 on a clear summer day in 2019"),
+    "rain in m": (
+        lambda: observed(precipitation_mm=0.00025),
+        r"precipitation_mm is 0.\d+ mm a year in 2019; \[20, 5000\] is allowed \(each row has the mm of its 240",
+    ),
+    "no rain in the second year": (
+        lambda: pd.concat([observed(), observed(366, start="2020-01-01", precipitation_mm=0.0)]),
+        r"precipitation_mm is 0 mm a year in 2020",
+    ),
+    "no humidity": (
+        lambda: observed(relative_humidity=0.0),
+        r"relative_humidity is 0 in half of all intervals in 2019",
+    ),
+    "truth": (lambda: observed(relative_humidity=True), r"relative_humidity has type bool; numbers are allowed"),
+    "complex": (lambda: observed(wind_speed_m_s=1 + 1j), r"wind_speed_m_s has type complex128; numbers are allowed"),
     "starts in February": (lambda: observed(30, start="2019-02-01"), r"starts at 2019-02-01 00:00.*1 January"),
     "starts at noon": (lambda: observed(30, start="2019-01-01 12:00"), r"starts at 2019-01-01 12:00.*00:00"),
     "a year and a bit": (lambda: observed(400), r"forcing of 400 days: whole years of 365 days"),

@@ -5,7 +5,7 @@ import pandas as pd
 
 from sim.io.clock import DAY, hours_apart, noon_of
 from sim.io.columns import MM_A_YEAR
-from sim.io.plausible import DAYS_OF_A_YEAR
+from sim.io.plausible import DAYS_OF_A_YEAR, LEAST_HUMIDITY, LEAST_SUN_W_M2
 from sim.state import DAYS, FORCING
 
 #: Allowed values of an observed forcing: column -> (low, high, unit, hint).
@@ -32,9 +32,13 @@ def interval_of(forcing) -> int:
         )
     if len(index) < 2:
         raise ValueError(f"forcing: {len(index)} rows; whole days at a regular interval are allowed")
+    if index.hasnans:
+        raise ValueError(f"forcing: the time of zero-based row {int(np.argmax(index.isna()))} is missing")
+    if not (index.is_monotonic_increasing and index.is_unique):
+        row = int(np.argmax(index[1:] <= index[:-1])) + 1
+        which = f"{index[row]} of zero-based row {row} follows {index[row - 1]}"
+        raise ValueError(f"forcing: its times are not sorted, or twice: {which}")
     minutes = (index[1] - index[0]) / pd.Timedelta(minutes=1)
-    if minutes <= 0:
-        raise ValueError(f"forcing: times do not increase at {index[1]}")
     if minutes == DAY:
         raise ValueError(
             "forcing: it is daily; sim.half_hours(forcing, latitude_deg) makes half-hours of it, and sim.read_forcing "
@@ -57,6 +61,9 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
             f"forcing: column {missing[0]} is missing; needed: {', '.join(FORCING)}; sim.read_forcing makes them of a "
             "tower's file"
         )
+    twice = [name for name in FORCING if list(forcing.columns).count(name) > 1]
+    if twice:
+        raise ValueError(f"forcing: column {twice[0]} is there twice")
     index = forcing.index
     interval = index[1] - index[0]
     late = index[1:][np.diff(index.to_numpy()) != interval.to_timedelta64()]
@@ -71,7 +78,7 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
         )
     kept = forcing.loc[~((index.month == 2) & (index.day == 29)), list(FORCING)]
     for name, (low, high, unit, hint) in FORCING_LIMITS.items():
-        if not pd.api.types.is_numeric_dtype(kept[name]):
+        if kept[name].dtype.kind not in "iuf":
             raise ValueError(f"forcing: {name} has type {kept[name].dtype}; numbers are allowed")
         values = kept[name].to_numpy(float)
         wrong = ~((values >= low) & (values <= high))
@@ -88,13 +95,9 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
     if days % 1 or (days > DAYS and days % DAYS) or (days < DAYS and years > 1):
         raise ValueError(f"forcing of {days:g} days: whole years of 365 days, or whole days with years=1, are allowed")
     _check_noon(kept, minutes)
-    if days >= DAYS_OF_A_YEAR:
-        yearly = float(kept["precipitation_mm"].mean() * per_day * DAYS)
-        if yearly > MM_A_YEAR[1]:
-            raise ValueError(
-                f"forcing: precipitation_mm is {yearly:.3g} mm a year; at most {MM_A_YEAR[1]:g} is allowed (each row "
-                f"has the mm of its {minutes} minutes)"
-            )
+    for _, year in kept.groupby(kept.index.year):
+        if len(year) >= DAYS_OF_A_YEAR * per_day:
+            _check_units(year, minutes)
     group = int(time_step_minutes // minutes)
     values = kept.to_numpy(float).reshape(-1, group, len(FORCING))
     steps = values.mean(axis=1)
@@ -102,6 +105,30 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
     days = int(min(days, DAYS))
     by_year = steps.reshape(-1, days * DAY // time_step_minutes, len(FORCING))
     return [np.ascontiguousarray(year) for year in by_year], days
+
+
+def _check_units(year: pd.DataFrame, minutes: int) -> None:
+    """Refuse a year within the limits that must be of another unit, as `plausible.check_units` does of a place."""
+    when = f"in {year.index[0].year}"
+    days = year["shortwave_w_m2"].groupby(year.index.normalize()).mean()
+    brightest = float(days.quantile(0.98))
+    if brightest < LEAST_SUN_W_M2:
+        raise ValueError(
+            f"forcing: shortwave_w_m2 is {brightest:.3g} W m-2 on a clear summer day {when}; at least "
+            f"{LEAST_SUN_W_M2:g} is allowed (is it in MJ m-2?)"
+        )
+    humidity = float(year["relative_humidity"].median())
+    if humidity < LEAST_HUMIDITY:
+        raise ValueError(
+            f"forcing: relative_humidity is {humidity:.2g} in half of all intervals {when}; more than "
+            f"{LEAST_HUMIDITY:g} is allowed"
+        )
+    yearly, (least, most) = float(year["precipitation_mm"].mean() * DAY / minutes * DAYS), MM_A_YEAR
+    if not least <= yearly <= most:
+        raise ValueError(
+            f"forcing: precipitation_mm is {yearly:.3g} mm a year {when}; [{least:g}, {most:g}] is allowed (each row "
+            f"has the mm of its {minutes} minutes)"
+        )
 
 
 def _check_noon(forcing: pd.DataFrame, minutes: int) -> None:

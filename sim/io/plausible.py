@@ -11,6 +11,7 @@ FEWEST_DAYS = 20  # that tell
 NOON_WITHIN_H = 0.75
 LEAST_SUN_W_M2 = 50.0  # extraterrestrial, of a day whose clearness tells
 WARM_C = 5.0
+LEAST_HUMIDITY = 0.15  # relative, in half of all intervals
 DAYS_OF_A_YEAR = 300  # at least, that a year's precipitation is told by
 
 
@@ -71,7 +72,7 @@ def _check_units(name, weather, columns, latitude_deg, interval) -> None:
         driest, median = float(moments.quantile(0.02)), float(moments.median())
         if driest > 0.85:
             refuse(humidity, f"relative humidity is above {100 * driest:.0f} % in 98 of 100 warm intervals")
-        if median < 0.15:
+        if median < LEAST_HUMIDITY:
             refuse(humidity, f"relative humidity is {100 * median:.2g} % in half of all warm intervals")
     if len(days) >= DAYS_OF_A_YEAR:
         yearly, (least, most) = float(weather["precipitation"].mean() * 1440 / interval * 365), MM_A_YEAR
