@@ -220,6 +220,6 @@ def test_every_step_has_its_record_if_asked():
 
 
 def test_ground_without_stems_starts_without_their_carbon():
-    env = quick(record_years=True, initial_ranges={"density_stems_ha": (0, 0), "biomass_kgc_m2": (5, 5)})
+    env = quick(record_steps=True, initial_ranges={"density_stems_ha": (0, 0), "biomass_kgc_m2": (5, 5)})
     env.reset(seed=0)
     assert env.step(boreal_env.NO_CHANGE)[-1]["record"]["biomass_change_kgc_m2"] >= 0
