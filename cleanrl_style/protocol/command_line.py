@@ -201,6 +201,7 @@ def watch(args: argparse.Namespace) -> None:
     frames, returns = play(env, lambda *given: policy.act(*given, generator=generator), seed, weights)
     env.unwrapped.render_mode = None
     _, nothing = play(env, lambda *given: boreal_env.NO_CHANGE, seed, weights)
+    print(f"{policy.name} on {args.env_id or policy.env_id}")
     for name, weight, one, other in zip(names, weights, returns, nothing, strict=True):
         print(f"{name:>12} weight {weight:.2f}: return {one:+.2f}, doing nothing {other:+.2f}, gain {one - other:+.2f}")
     print(f"{'scalarised':>12} gain {weights @ (returns - nothing):+.2f}")
