@@ -56,6 +56,8 @@ def test_returns_of_another_number_of_objectives_are_refused():
     policy = protocol.load_policy("eupg_var_lambda")
     with pytest.raises(ValueError, match=r"eupg_var_lambda: accrued_returns \(1, 2\) are allowed, got \(1, 3\)"):
         policy.act(np.zeros(105), np.ones(25, bool), [0.0, 0.0, 0.0])
+    with pytest.raises(ValueError, match="eupg_var_lambda: accrued_returns are not finite"):
+        policy.act(np.zeros(105), np.ones(25, bool), [np.nan, 0.0])
 
 
 def test_a_policy_whose_training_went_wrong_is_refused(tmp_path):

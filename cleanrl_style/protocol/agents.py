@@ -55,6 +55,8 @@ class Policy:
         wanted = (len(masks), _objectives(self.arguments))
         if self.looks_back and accrued.shape != wanted:
             raise ValueError(f"{self.name}: accrued_returns {wanted} are allowed, got {accrued.shape}")
+        if self.looks_back and not np.isfinite(accrued).all():
+            raise ValueError(f"{self.name}: accrued_returns are not finite")
         uniforms = None if generator is None else generator.random(len(masks))
         actions = choose_actions(self.probabilities(observations, masks, accrued), uniforms)
         return int(actions[0]) if np.ndim(observation) == 1 else actions
