@@ -107,6 +107,10 @@ def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:
         if low > high:
             raise ValueError(f"initial range {name}: reversed, {low:g} > {high:g}")
         checked[name] = (low, high)
+    most = {**INITIAL_RANGES, **checked}
+    stems, biomass = most["density_stems_ha"][1], most["biomass_kgc_m2"][1]
+    if stems == 0.0 and biomass > 0.0:
+        raise ValueError(f"initial range biomass_kgc_m2: up to {biomass:g}; without stems, (0, 0) is allowed")
     return checked
 
 
@@ -196,7 +200,7 @@ def drawn_stocks(dice: dict, given: dict, ranges: dict) -> dict[str, float]:
     stocks.update(given)
     classes = [stocks[name] for name in CLASS_NAMES if name in stocks]
     density = sum(classes) if classes else stocks["density_stems_ha"]
-    if "biomass_kgc_m2" not in given:
+    if "biomass_kgc_m2" not in given and density > 0.0:
         held = density * LARGEST_STEM_KGC * 1e-4
         low, high = (min(end, held) for end in ranges["biomass_kgc_m2"])
         stocks["biomass_kgc_m2"] = low + (high - low) * dice["biomass_kgc_m2"]

@@ -28,7 +28,7 @@ from sim.parameters import (
     check_overrides,
     check_weather,
 )
-from sim.saved import check_array, check_keys, check_settings
+from sim.saved import check_array, check_keys
 from sim.scenario import CO2, WITHOUT_SCENARIO, check_scenario
 from sim.spin_up import (
     BOUNDARIES,
@@ -58,7 +58,7 @@ from sim.state import (
 )
 
 ARRAYS = ("parameters", "state", "record", "years")  # of what a state saves
-SAVED = ("settings", *ARRAYS, "seeds", "weather", "disturbance")  # that the future depends on
+SAVED = (*ARRAYS, "seeds", "weather", "disturbance")  # that the future depends on
 LONGEST_STEP_MINUTES = 120  # beyond, the air is up to 2 K too warm
 
 
@@ -285,7 +285,6 @@ class Stands:
     def get_state(self) -> dict:
         """Everything that the future depends on, as a picklable dict."""
         return {
-            "settings": self._settings(),
             **{name: getattr(self, name).copy() for name in ARRAYS},
             "seeds": list(self.seeds),
             "weather": [g and g.bit_generator.state for g in self._weather],
@@ -293,10 +292,14 @@ class Stands:
         }
 
     def set_state(self, state: dict) -> None:
-        """Continue from a `get_state` of as many stands with the same arguments; ValueError for any other."""
+        """Continue from a `get_state` of as many stands; ValueError, and nothing done, for what is none.
+
+        Constants, mechanisms and weather are the state's from then on, all else is as these stands have it.
+        """
         what = "state of stands"
         check_keys(what, state, SAVED)
-        check_settings(what, state["settings"], self._settings())
+        if np.shape(state["years"]) != self.years.shape:
+            raise ValueError(f"state of {np.size(state['years'])} stands given to {self.number}")
         for name in ARRAYS:
             low, high = (0, 1000) if name == "years" else (-np.inf, np.inf)
             check_array(f"{what}: {name}", state[name], getattr(self, name), low, high)
@@ -310,16 +313,14 @@ class Stands:
                 raise ValueError(f"{what}: seeds: sim.Seeds are allowed, got {brief(seeds)}")
             values = dict(zip(PARAMETER_NAMES, row.tolist(), strict=True))
             check_overrides({name: values[name] for name in SITE_PARAMETERS})
-            for name, value in {**self.constants, **self.mechanisms, **self.weather, **WITHOUT_SCENARIO}.items():
-                if values[name] != value:
-                    raise ValueError(f"{what}: {name} = {values[name]:g}, {value:g} is allowed, as in its settings")
+            check_constants({name: values[name] for name in self.constants})
         weather, disturbance = ([restored_generator(g) for g in state[name]] for name in ("weather", "disturbance"))
         for name in ARRAYS:
             setattr(self, name, state[name].copy())
         self.seeds, self._weather, self._disturbance = list(state["seeds"]), weather, disturbance
 
-    def _settings(self) -> dict:
-        """Arguments that a state belongs to, as plain values."""
+    def settings(self) -> dict:
+        """The arguments, as plain values, by which an environment tells whether a state is its own."""
         scenario = self.scenario and {"names": self.scenario.names, "values": self.scenario.values.tolist()}
         return {
             "time_step_minutes": 1440 // self.steps_per_day,

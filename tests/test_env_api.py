@@ -217,9 +217,3 @@ def test_every_step_has_its_record_if_asked():
         densities.append(info["record"]["density_stems_ha"])
     np.testing.assert_array_equal(densities, info["years"]["density_stems_ha"])
     assert together["_record"].all() and together["record"]["_density_stems_ha"].all()
-
-
-def test_ground_without_stems_starts_without_their_carbon():
-    env = quick(record_steps=True, initial_ranges={"density_stems_ha": (0, 0), "biomass_kgc_m2": (5, 5)})
-    env.reset(seed=0)
-    assert env.step(boreal_env.NO_CHANGE)[-1]["record"]["biomass_change_kgc_m2"] >= 0

@@ -291,9 +291,10 @@ class Episodes:
             setattr(self, name, state[name].copy())
 
     def _settings(self) -> dict:
-        """Arguments that a state belongs to, besides the stands', as plain values; functions by their names."""
+        """Arguments that a state belongs to, as plain values; functions by their names."""
         timber = self.timber and {"prices": self.timber.prices, "discount_rate": self.timber.discount_rate}
         return {
+            **self.stands.settings(),
             "mode": self.mode,
             "years": self.years,
             "thaw_formulation": self.thaw_formulation,
