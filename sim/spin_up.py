@@ -96,7 +96,7 @@ def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float
 
 
 def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:
-    """Ranges of first stocks, checked like `check_initial`; each a (low, high) pair."""
+    """Ranges of first stocks, checked like `check_initial`; each a (low, high) pair. No stems have no biomass."""
     checked = {}
     for name, pair in check_mapping("initial_ranges", ranges).items():
         if name not in DRAWN:
@@ -107,10 +107,10 @@ def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:
         if low > high:
             raise ValueError(f"initial range {name}: reversed, {low:g} > {high:g}")
         checked[name] = (low, high)
-    most = {**INITIAL_RANGES, **checked}
-    stems, biomass = most["density_stems_ha"][1], most["biomass_kgc_m2"][1]
-    if stems == 0.0 and biomass > 0.0:
-        raise ValueError(f"initial range biomass_kgc_m2: up to {biomass:g}; without stems, (0, 0) is allowed")
+    if checked.get("density_stems_ha") == (0.0, 0.0):
+        biomass = checked.setdefault("biomass_kgc_m2", (0.0, 0.0))[1]
+        if biomass > 0.0:
+            raise ValueError(f"initial range biomass_kgc_m2: up to {biomass:g}; without stems, (0, 0) is allowed")
     return checked
 
 

@@ -32,7 +32,10 @@ BAD_ARGUMENTS = {
     "range of one": ({"initial_ranges": {"biomass_kgc_m2": 3}}, r"initial range biomass_kgc_m2: a \(low, high\) pair"),
     "range reversed": ({"initial_ranges": {"biomass_kgc_m2": (3, 1)}}, r"biomass_kgc_m2: reversed, 3 > 1"),
     "range beyond limits": ({"initial_ranges": {"biomass_kgc_m2": (-1, 1)}}, r"biomass_kgc_m2 = -1: .*\[0, 60\]"),
-    "ranges without stems": ({"initial_ranges": {"density_stems_ha": (0, 0)}}, r"biomass_kgc_m2: up to 10; .*\(0, 0\)"),
+    "ranges without stems": (
+        {"initial_ranges": {"density_stems_ha": (0, 0), "biomass_kgc_m2": (0, 10)}},
+        r"biomass_kgc_m2: up to 10; .*\(0, 0\)",
+    ),
     "ranges in a list": ({"initial_ranges": [1]}, r"initial.*dict.* got list"),
     "half-life 0": ({"hwp_half_life_years": 0}, r"hwp_half_life_years.* 0"),
     "half-life of text": ({"hwp_half_life_years": "long"}, r"hwp_half_life_years.*'long'"),
