@@ -26,7 +26,7 @@ from sim.block import kernel, lanes_for
 from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS, as_array
 from sim.parameters import check_name, check_overrides, check_seed
-from sim.stands import available_cores
+from sim.stands import available_cores, positive_integer
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
 from sim.task.episodes import (
     BALANCED_WORLD,
@@ -109,7 +109,8 @@ def warm_up(num_envs: int = 1, threads: int | None = None) -> None:
 
     Called before worker processes are forked (with 1: each has one stand), it saves each of them the compilation.
     """
-    kernel(lanes_for(num_envs, threads or available_cores()))
+    threads = available_cores() if threads is None else positive_integer("threads", threads)
+    kernel(lanes_for(positive_integer("num_envs", num_envs), threads))
 
 
 class Described:

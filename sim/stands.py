@@ -102,8 +102,8 @@ class Stands:
         harvest_min_class="young",
         threads=None,
     ):
-        self.number = _positive_integer("number of stands", number)
-        minutes = _positive_integer("time_step_minutes", time_step_minutes)
+        self.number = positive_integer("number of stands", number)
+        minutes = positive_integer("time_step_minutes", time_step_minutes)
         if 1440 % minutes or minutes > LONGEST_STEP_MINUTES:
             raise ValueError(
                 f"time_step_minutes = {minutes}: a divisor of 1440 is allowed, such as 10, 15, 30, 60, and at most "
@@ -123,7 +123,7 @@ class Stands:
             raise ValueError(f"constants: {CO2} follows the scenario; a value of your own is not allowed")
         self.first_cut_age = first_cut_age(harvest_min_class, self.constants)
         self.products_decay = yearly_decay(hwp_half_life_years)
-        self.threads = available_cores() if threads is None else _positive_integer("threads", threads)
+        self.threads = available_cores() if threads is None else positive_integer("threads", threads)
         self.lanes = lanes_for(self.number, self.threads)
         self._run_block: Callable = partial(run_block, self.lanes, backend=backend)
         if backend == "cuda":
@@ -411,7 +411,8 @@ def yearly_decay(half_life_years) -> float:
     return 1.0 - 0.5 ** (1.0 / half_life_years)
 
 
-def _positive_integer(name, value) -> int:
+def positive_integer(name, value) -> int:
+    """A count that was given. Raises ValueError naming it."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 1:
         raise ValueError(f"{name}: a positive integer is allowed, got {value!r}")
     return int(value)

@@ -14,6 +14,8 @@ SHORT = {"years": 3, "time_step_minutes": 120}
 def test_it_is_the_lockstep_environment_scalarised():
     envs = gym.make_vec("boreal-generalist-v0", num_envs=3, record_steps=True, **SHORT).stable_baselines3()
     same = gym.make_vec("boreal-generalist-v0", num_envs=3, **SHORT)
+    with pytest.raises(ValueError, match="seed: an integer .* got -1"):
+        envs.seed(-1)
     envs.seed(5)
     envs.set_options([{"preference": w} for w in (0.0, 0.25, 1.0)])
     shown = envs.reset()

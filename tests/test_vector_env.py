@@ -19,6 +19,13 @@ def test_stable_baselines3_is_named_where_it_is_missing(monkeypatch):
         quick_vector(2).stable_baselines3()
 
 
+def test_nothing_is_compiled_for_no_stands():
+    with pytest.raises(ValueError, match="num_envs: a positive integer is allowed, got -1"):
+        boreal_env.warm_up(-1)
+    with pytest.raises(ValueError, match="threads: a positive integer is allowed, got 0"):
+        boreal_env.warm_up(threads=0)
+
+
 @pytest.mark.parametrize("mode", boreal_env.MODES)
 def test_async_lockstep_and_a_plain_loop_agree_to_the_bit(mode):
     number, kwargs = 3, {**QUICK, "mode": mode, "record_years": True}

@@ -51,9 +51,7 @@ class SiteControls:
         self.changed = changed
         self.world = pn.widgets.Select(label="World", options=WORLDS)
         self.place = pn.widgets.Select(label="Site", options=[EVALUATION, *PLACES])
-        self.number = pn.widgets.IntInput(
-            label="Number of the evaluation site", value=1, start=1, end=len(evaluation_sites())
-        )
+        self.number = pn.widgets.IntSlider(label="Number of the evaluation site", start=1, end=len(evaluation_sites()))
         self.seed = pn.widgets.IntInput(label="Seed of first stand, weather and dice", value=0, start=0, end=2**31 - 1)
         self.sliders = {
             parameter: pn.widgets.FloatSlider(
@@ -66,7 +64,7 @@ class SiteControls:
         self.take_world()
         self.watch(self.world, "value", lambda _: self.take_world())
         self.watch(self.place, "value", lambda _: self.take_place())
-        self.watch(self.number, "value", lambda _: self.take_place())
+        self.watch(self.number, "value_throttled", lambda _: self.take_place())
         self.watch(self.seed, "value", lambda _: None)
         for parameter, slider in self.sliders.items():
             self.watch(slider, "value_throttled", functools.partial(self.move, parameter))

@@ -203,7 +203,7 @@ class Objective:
         value = np.asarray(self.value(shown), dtype=float)
         number = len(year["carbon_reward"])
         if value.shape != (number,) or not np.isfinite(value).all():
-            raise ValueError(f"objective {self.name}: {number} finite numbers are allowed, got {value}")
+            raise ValueError(f"objective {self.name}: an array of {number} finite numbers is allowed, got {value!r}")
         reward = np.clip(value, self.low, self.high)
         return {f"{self.name}_clipped": value - reward, f"{self.name}_reward": reward}
 

@@ -1,7 +1,11 @@
 """Stands in lockstep for Stable-Baselines3: `BorealVectorEnv.stable_baselines3()` gives them so."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
+
+from sim.parameters import check_seed
 
 
 class LockstepVecEnv(VecEnv):
@@ -14,6 +18,10 @@ class LockstepVecEnv(VecEnv):
     def __init__(self, envs):
         self.envs = envs
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seeds of the stands at the next reset: stand i gets seed + i."""
+        return super().seed(None if seed is None else check_seed("seed", seed))
 
     def reset(self) -> np.ndarray:
         """Start episodes."""
