@@ -284,7 +284,7 @@ def on_other_sites(results: Results) -> str:
     """Score, NHGR and EUGR of the policies that were judged inside and outside the sampled range, the greedy ones."""
     rows = []
     for path in sorted((results.studies_dir / "generalisation").glob("*.csv")):
-        scores = {(policy, split): score for policy, split, score in stored.settings_of(path)["scores"]}
+        scores = {(policy, split): score for policy, split, score in stored.settings(path)["scores"]}
         of_splits = dict(tuple(stored.read(path).groupby("split", sort=False)))
         for row in generalisation.summaries(of_splits).to_dict("records"):
             folder, _, policy = row["policy"].rpartition(", ")
@@ -368,6 +368,7 @@ EXCERPTS = {
     "scaling": excerpts.scaling,
     "region_killed": excerpts.region_killed,
     "boreal_map": excerpts.boreal_map,
+    "outside_speed": excerpts.outside_speed,
     "times": excerpts.times,
     "misses": excerpts.missing,
     "knowing_the_site": excerpts.knowing_the_site,

@@ -116,6 +116,18 @@ def region_killed() -> str:
     )
 
 
+def outside_speed() -> str:
+    """What other libraries' algorithms take of a processor; results/studies/outside_speed.csv has it."""
+    path = paths.studies() / "outside_speed.csv"
+    if not path.exists():
+        return "Not measured yet.\n"
+    rows = [
+        [f"`{row.script}.py`", f"{row.milliseconds_a_step:.1f}", f"{row.hours:.1f}"]
+        for row in stored.read(path).itertuples()
+    ]
+    return markdown(["command", "ms a step", "hours for 300,000 steps"], rows)
+
+
 def boreal_map() -> str:
     """What the map says; results/studies/boreal_map.csv has it."""
     path = paths.studies() / "boreal_map.csv"

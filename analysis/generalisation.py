@@ -199,7 +199,7 @@ def searched_plans(task: protocol.Task) -> pd.DataFrame | None:
     path = paths.studies() / "best_plans" / f"{task.env_id}.csv"
     if set(task.env_kwargs) - {"observation_groups"}:
         return None
-    if not path.exists() or stored.settings_of(path)["physics"] != open_loop.fingerprint():
+    if not path.exists() or stored.settings(path)["physics"] != open_loop.fingerprint():
         print(f"{path} is not there, or of another physics: `python analysis/best_plans.py` makes it")
         return None
     table = stored.read(path, text=("plan",))

@@ -35,9 +35,3 @@ def is_finished(path: Path, settings: dict) -> bool:
         return False
     with path.open(encoding="utf-8") as file:
         return file.readline() == f"# {json.dumps(settings)}\n"
-
-
-def settings_of(path: Path) -> dict:
-    """The settings that a table was made with."""
-    with path.open(encoding="utf-8") as file:
-        return json.loads(file.readline().removeprefix("#"))
