@@ -109,6 +109,13 @@ def namespace(record):
     return SimpleNamespace(**{name: namespace(value) if value.dtype.names else value for name, value in fields})
 
 
+def compiling(lanes: int) -> str:
+    """What is said while a kernel is compiled; there is one for each number of lanes."""
+    return (
+        f"compiling the physics for {lanes} stand{'s'[: lanes > 1]} at a time, once for this processor: half a minute"
+    )
+
+
 def kernel(lanes: int):
     """The year kernel for blocks of this many lanes, compiled or loaded from the disk cache when it is first wanted.
 
@@ -118,7 +125,7 @@ def kernel(lanes: int):
         if lanes not in _MADE:
             with alone(f"{lanes}_lanes"):
                 if not is_compiled(lanes):
-                    _LOGGER.warning("compiling the physics, once for this processor: half a minute")
+                    _LOGGER.warning(compiling(lanes))
                 _MADE[lanes] = _made(lanes)
         return _MADE[lanes]
 

@@ -110,9 +110,8 @@ def test_the_library_says_that_it_compiles_and_keeps_it(cache, tmp_path, caplog)
     cache(tmp_path)
     assert not block.is_compiled(1)
     assert block.kernel(1)(None, 1, 0, None, None) == 2
-    assert [record.message for record in caplog.records] == [
-        "compiling the physics, once for this processor: half a minute"
-    ]
+    said = "compiling the physics for 1 stand at a time, once for this processor: half a minute"
+    assert [record.message for record in caplog.records] == [said]
     cache(tmp_path)
     assert block.is_compiled(1)
     assert block.kernel(1).stats.cache_hits and len(caplog.records) == 1

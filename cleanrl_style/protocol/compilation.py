@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Iterable
 
-from sim.block import is_compiled, kernel
+from sim.block import compiling, is_compiled, kernel
 
 LOGGER = logging.getLogger("sim.block")  # it says in one line, on stderr, what is said here
 INTERVAL = 5.0  # seconds between signs of life
@@ -27,9 +27,7 @@ def compile_physics(lanes: Iterable[int], later: Iterable[int] = ()) -> None:
     complete = all(map(is_compiled, (first, *others)))
     for number in others:
         begin(number)
-    with (
-        contextlib.nullcontext() if complete else alive("compiling the physics, once for this processor: half a minute")
-    ):
+    with contextlib.nullcontext() if complete else alive(compiling(first)):
         finish(first)
         kernel(first)
         for number in others:

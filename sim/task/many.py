@@ -25,7 +25,7 @@ import numpy as np
 import pandas as pd
 
 import sim
-from sim.block import is_compiled, lanes_for
+from sim.block import compiling, is_compiled, lanes_for
 from sim.executor import HERE, each
 from sim.management import NUM_ACTIONS, as_array, check_actions
 from sim.parameters import check_name, check_seed
@@ -152,7 +152,7 @@ def simulate_many(
     with Store(path, plan, label, overwrite) as store:
         lanes = lanes_for(size, plan.threads)
         if progress and store.waiting and one.stands.backend == "numba" and not is_compiled(lanes):
-            print("compiling the physics, once for this processor: half a minute", flush=True)
+            print(compiling(lanes), flush=True)
         tell = Progress(plan, store.waiting) if progress else None
         parts = (plan.part(k) for k in store.waiting)
         for number, played in each(play, parts, workers=1 if address == HERE else None, address=address):
