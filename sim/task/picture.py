@@ -337,7 +337,8 @@ def draw_ground(ax, view: View) -> None:
     swe = view.last("peak_swe_mm", s["swe"])
     snow = view.last("peak_snow_depth_m", s["swe"] / s["snow_density"])
 
-    low, high = min(mean - 4.0, boundary - 3.0, surface - 1.0), max(mean + 4.0, boundary + 2.0, 4.0)
+    points = np.concatenate([[air], temperatures]), np.concatenate([[0.88], height_on_scale(depths)])
+    low, high = min(mean - 4.0, boundary - 3.0, points[0].min() - 1.0), max(mean + 4.0, 4.0, points[0].max() + 2.0)
     bottom = height_on_scale(1.04 * depths[-1])
     ax.set(xlim=(low, high), ylim=(bottom, 1.05))
     y = np.linspace(height_on_scale(organic), bottom, 160)
@@ -353,7 +354,6 @@ def draw_ground(ax, view: View) -> None:
     ax.set(xlim=(low, high), ylim=(bottom, 1.05))
 
     ax.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
-    points = np.concatenate([[air], temperatures]), np.concatenate([[0.88], height_on_scale(depths)])
     ax.plot(*points, color="white", linewidth=3.2, solid_joinstyle="round")
     ax.plot(
         *points,
@@ -366,7 +366,10 @@ def draw_ground(ax, view: View) -> None:
     )
     air_name = "air" if view.year else "air, annual mean"
     for name, x, y in zip((air_name, "surface soil", "deep soil", "boundary"), *points, strict=True):
-        ax.text(x + 0.02 * (high - low), y, f"{name} {x:.1f}", fontsize=SMALL, color=INK, va="center", bbox=LABEL)
+        left = x > 0.3 * low + 0.7 * high  # of the point, where the label would be cut off on its right
+        offset, side = (-0.02, "right") if left else (0.02, "left")
+        x_of_label = x + offset * (high - low)
+        ax.text(x_of_label, y, f"{name} {x:.1f}", fontsize=SMALL, color=INK, ha=side, va="center", bbox=LABEL)
 
     labels = [(f"snow, {swe:.0f} mm of water", "left", -0.25 * max(snow, 0.1))]
     if organic > 0.0:
