@@ -68,6 +68,8 @@ def archive_run(run: runs.Run, archive_dir: Path, jobs: list[experiments.Job]) -
 
 def archive(runs_dir: Path, archive_dir: Path) -> None:
     """Archive every finished run of a folder; says what it left out, and how large the archive is."""
+    if not runs_dir.is_dir():
+        protocol.fail(f"--runs-dir {runs_dir}: no such folder")
     found, left_out = runs.read_runs(runs_dir)
     for line in left_out:
         print(f"not archived: {line}", file=sys.stderr)

@@ -68,6 +68,8 @@ def support_points(values: np.ndarray, number: int, barred=()) -> list[int]:
 
 def main(args: Args) -> None:
     """Choose and write."""
+    if args.candidates < sum(NUMBERS.values()):
+        protocol.fail(f"--candidates {args.candidates}: at least {sum(NUMBERS.values())}, as many as are chosen")
     seeds = sites.FIRST_EVALUATION_SEED + np.arange(args.candidates)
     table = pd.DataFrame({"seed": seeds, "site_seed": [site_seed_of(int(seed)) for seed in seeds]})
     values = pd.DataFrame([strata(sim.sample_site(seed)) for seed in table.site_seed])

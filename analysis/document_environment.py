@@ -99,6 +99,10 @@ Of a vector environment each is an array in `infos["final_info"]`.
 `boreal_env.Objective(name, value, low, high)`. {inspect.getdoc(Objective)}
 
 ```python
+import gymnasium as gym
+import boreal_env
+
+
 def timber(year):
     \"\"\"Revenue from what is cut, 1 for 1 kgC/m2.\"\"\"
     return year["harvest_kgc_m2"]

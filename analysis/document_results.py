@@ -378,6 +378,8 @@ EXCERPTS = {
 
 def main(args: Args) -> None:
     """Rewrite the sections of all pages."""
+    if not (args.root / PAGES[0]).exists():
+        protocol.fail(f"--root {args.root}: no {PAGES[0]} there")
     results = Results.load(False, args.runs_dir)
     rows = results.rows  # completes left_out
     for problem in results.left_out:

@@ -120,7 +120,7 @@ def outside_speed() -> str:
     """What other libraries' algorithms take of a processor; results/studies/outside_speed.csv has it."""
     path = paths.studies() / "outside_speed.csv"
     if not path.exists():
-        return "Not measured yet.\n"
+        return "Not run yet: `python analysis/studies/outside_speed.py`.\n"
     rows = [
         [f"`{row.script}.py`", f"{row.milliseconds_a_step:.1f}", f"{row.hours:.1f}"]
         for row in stored.read(path).itertuples()

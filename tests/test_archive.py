@@ -102,6 +102,11 @@ def test_a_damaged_archive_is_named(archived):
     assert "damaged: tables.zip" in runs.read_runs(archived)[1][0]
 
 
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(SystemExit, match="--runs-dir .*nope: no such folder"):
+        archive.archive(tmp_path / "nope", tmp_path / "archive")
+
+
 def test_unfinished_runs_are_named(tmp_path, capsys):
     write_run(tmp_path / "runs" / "one", "zero_change")
     (tmp_path / "runs" / "one" / "evaluation.csv").unlink()

@@ -288,3 +288,5 @@ def test_entries_can_be_read_in_their_unit():
     assert boreal_env.in_unit(observations, "latitude", env.observation_names)[0] == pytest.approx(60.5, rel=1e-6)
     with pytest.raises(ValueError, match="the observation has no entry 'densities'"):
         boreal_env.in_unit(observations, "densities")
+    with pytest.raises(ValueError, match=r"shape \(n, 43\) or wider is allowed .* got \(2, 10\)"):
+        boreal_env.in_unit(np.zeros((2, 10)), "density")

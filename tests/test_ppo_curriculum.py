@@ -462,6 +462,7 @@ def test_learns_the_toy(tmp_path):
         (["--site-seed", "3", "--env-id", "toy_env:toy-v0"], "--site-seed is for boreal environments"),
         (["--thaw-formulation", "contrast", "--env-id", "toy_env:toy-v0"], "not for --env-id toy_env:toy-v0"),
         (["--vectorization", "lockstep", "--env-id", "toy_env:toy-v0"], "no vector entry point"),
+        (["--reward-scales", "0", "0"], "--reward-scales: not all of them 0, which leaves nothing to learn"),
         (["--reward-scales", "1", "-1"], "--reward-scales must lie in [0, 1000000], not -1"),
         (
             ["--reward-scales", "1", "1", "1"],

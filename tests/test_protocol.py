@@ -118,6 +118,23 @@ def test_sampling_follows_the_probabilities():
     assert evaluation.choose_actions(probabilities[:1], None).tolist() == [3]
 
 
+@pytest.mark.parametrize(
+    "given, message",
+    [
+        (lambda masks: np.ones((len(masks), 3)) / 3, r"shape \(18, 25\) is allowed, got \(18, 3\)"),
+        (lambda masks: np.zeros(len(masks)), r"shape \(18, 25\) is allowed, got \(18,\)"),
+        (lambda masks: np.ones(masks.shape), r"sums of 1 are allowed, got 1 and 25"),
+        (
+            lambda masks: np.eye(25)[[0] * len(masks)] * 2 - np.eye(25)[[1] * len(masks)],
+            r"none below 0 .* got -1 and 1",
+        ),
+    ],
+)
+def test_what_is_no_distribution_of_actions_is_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        evaluate(lambda observations, masks, accrued_returns: given(masks))
+
+
 @pytest.mark.parametrize("uniforms", [None, np.array([0.5])])
 def test_a_diverged_policy_is_refused(uniforms):
     with pytest.raises(FloatingPointError, match="diverged"):

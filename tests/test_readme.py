@@ -34,9 +34,8 @@ def test_commands_and_links_name_files_that_exist():
 @pytest.mark.parametrize("name", EXCERPTS)
 def test_excerpts_are_of_what_was_measured_last(name, monkeypatch):
     monkeypatch.chdir(ROOT)
-    pages = [
-        (ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("performance.md", "scaling.md", "learning.md")
-    ]
+    names = ("performance.md", "scaling.md", "learning.md", "outside.md")
+    pages = [(ROOT / "docs" / page).read_text(encoding="utf-8") for page in names]
     shown = {match[0] for match in SECTION.finditer(README + START + RESULTS + "".join(pages)) if match[2] == name}
     assert shown == {f"<!-- results of {name} -->\n{EXCERPTS[name]()}<!-- end of results -->"}
 

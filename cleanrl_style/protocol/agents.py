@@ -80,7 +80,10 @@ def load_policy(run_or_name, script=None) -> Policy:
     policy, or not the script, and ValueError if the script's network is another one by now.
     """
     path = policy_file(run_or_name)
-    import torch
+    try:
+        import torch
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError('load_policy needs torch: pip install -e ".[train]"', name="torch") from error
 
     try:
         saved = torch.load(path, weights_only=True)

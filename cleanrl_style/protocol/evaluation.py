@@ -79,6 +79,18 @@ class PlainLoop(gym.vector.VectorEnv):
             env.close()
 
 
+def check_probabilities(probabilities, shape: tuple[int, int]) -> None:
+    """Raise an error, naming what is allowed, for what a policy gave that are no probabilities of actions."""
+    if np.shape(probabilities) != shape:
+        raise ValueError(f"a policy's probabilities: shape {shape} is allowed, got {np.shape(probabilities)}")
+    if not np.isfinite(probabilities).all():
+        raise FloatingPointError("the policy's action probabilities are not finite numbers: its training diverged")
+    sums = np.sum(probabilities, axis=1, dtype=np.float64)
+    if np.min(probabilities) < 0.0 or np.abs(sums - 1.0).max() > 1e-3:
+        got = f"got {np.min(probabilities):g} and {sums[np.abs(sums - 1.0).argmax()]:g}"
+        raise ValueError(f"a policy's probabilities: none below 0 and sums of 1 are allowed, {got}")
+
+
 def choose_actions(probabilities: np.ndarray, uniforms: np.ndarray | None) -> np.ndarray:
     """Actions (n,) for probabilities (n, 25): the most probable, or those drawn by a uniform number each."""
     if not np.isfinite(probabilities).all():
@@ -101,7 +113,9 @@ def play(task: Task, envs, policy, weights: np.ndarray, seeds: list[int], greedy
     playing = np.ones(len(seeds), dtype=bool)
     while playing.any():
         observations = observations.astype(np.float32)
-        probabilities = policy(observations, task.action_masks(envs, observations), returns)
+        masks = task.action_masks(envs, observations)
+        probabilities = policy(observations, masks, returns)
+        check_probabilities(probabilities, masks.shape)
         uniforms = np.array([generator.random() for generator in generators])
         drawn = choose_actions(probabilities, uniforms)
         actions = np.where(greedy, choose_actions(probabilities, None), drawn)

@@ -61,7 +61,7 @@ def _check_units(name, weather, columns, latitude_deg, interval) -> None:
     possible = extraterrestrial(dates, latitude_deg)
     sunny = (possible > LEAST_SUN_W_M2) & days["shortwave"].notna().to_numpy()
     if sunny.sum() >= FEWEST_DAYS:
-        brightest = float(np.quantile((days["shortwave"].to_numpy() / possible)[sunny], 0.98))
+        brightest = float(np.quantile(days["shortwave"].to_numpy()[sunny] / possible[sunny], 0.98))
         if not 0.3 <= brightest <= 1.1:
             share = f"{100 * brightest:.3g} % of the sunlight above the atmosphere"
             refuse(columns["shortwave"], f"a clear day has {share}, where 60 to 85 are usual", possible=False)

@@ -289,7 +289,16 @@ class Reader:
 
 
 def in_unit(observations: np.ndarray, name: str, names: Sequence[str] = OBSERVATION_NAMES) -> np.ndarray:
-    """One entry of observations with these names, or with the first of them, in its own unit again, shape (n,)."""
+    """One entry of observations with these names, in its own unit again, shape (n,).
+
+    Without names, of all that is observed of two objectives, or of all but the site. Raises ValueError for fewer.
+    """
+    least = sum(row.group != "site" for row in OBSERVATION) if names is OBSERVATION_NAMES else len(names)
+    if np.ndim(observations) != 2 or np.shape(observations)[1] < least:
+        raise ValueError(
+            f"observations: shape (n, {least}) or wider is allowed with these names, got {np.shape(observations)}; the "
+            "names of an environment's entries are its observation_names"
+        )
     return Reader((name,), names)(observations)[:, 0]
 
 
