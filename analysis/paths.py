@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-REPOSITORY = Path(__file__).parents[1]
 QUICK = "quick"  # folder of what `reproduce.py --quick` makes, which are no results
 
 

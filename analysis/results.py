@@ -181,9 +181,8 @@ class Results:
 
     @cached_property
     def constant_plans(self) -> pd.DataFrame | None:
-        """The study of that name; the repository's where none is below the working folder, as of a script elsewhere."""
-        theirs, ours = self.study("constant_plans"), paths.REPOSITORY / paths.studies() / "constant_plans.csv"
-        return stored.read(ours) if theirs is None and self.studies_dir == paths.studies() and ours.exists() else theirs
+        """The study of that name."""
+        return self.study("constant_plans")
 
     def objectives(self, env_id: str) -> list[str]:
         """An environment's objectives, by its runs; the paper's two without a run."""
