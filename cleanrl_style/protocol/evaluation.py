@@ -80,11 +80,9 @@ class PlainLoop(gym.vector.VectorEnv):
 
 
 def check_probabilities(probabilities, shape: tuple[int, int]) -> None:
-    """Raise an error, naming what is allowed, for what a policy gave that are no probabilities of actions."""
+    """Raise a ValueError for what are no probabilities of actions; `choose_actions` refuses those that are not finite."""
     if np.shape(probabilities) != shape:
         raise ValueError(f"a policy's probabilities: shape {shape} is allowed, got {np.shape(probabilities)}")
-    if not np.isfinite(probabilities).all():
-        raise FloatingPointError("the policy's action probabilities are not finite numbers: its training diverged")
     sums = np.sum(probabilities, axis=1, dtype=np.float64)
     if np.min(probabilities) < 0.0 or np.abs(sums - 1.0).max() > 1e-3:
         got = f"got {np.min(probabilities):g} and {sums[np.abs(sums - 1.0).argmax()]:g}"
