@@ -80,7 +80,7 @@ class PlainLoop(gym.vector.VectorEnv):
 
 
 def check_probabilities(probabilities, shape: tuple[int, int]) -> None:
-    """Raise a ValueError for what are no probabilities of actions; `choose_actions` refuses those that are not finite."""
+    """Raise a ValueError for what are no probabilities; `choose_actions` refuses those that are not finite."""
     if np.shape(probabilities) != shape:
         raise ValueError(f"a policy's probabilities: shape {shape} is allowed, got {np.shape(probabilities)}")
     sums = np.sum(probabilities, axis=1, dtype=np.float64)
