@@ -24,7 +24,7 @@ import pandas as pd
 from analysis import experiments, metrics, paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts, reference, sites
+from cleanrl_style.protocol import arguments, fronts, reference, sites
 from cleanrl_style.protocol.evaluation import lanes_of
 from sim.task.fronts import FOLDER, play_plans
 
@@ -167,7 +167,7 @@ def main(args: Args) -> None:
     """Search every site that is not finished, and ship the plans of an environment whose sites all are."""
     if args.budget < 2 * len(ACTIONS):
         sys.exit(f"error: --budget {args.budget}: {2 * len(ACTIONS)} or more are allowed")
-    tasks = [protocol.Task.of(env_id) for env_id in args.env_id]
+    tasks = [arguments.ask(env_id) for env_id in args.env_id]
     for task in tasks:
         if not task.boreal or not task.draws_sites:
             sys.exit(f"error: --env-id {task.env_id}: an environment of ours that draws sites is allowed")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import boreal_env
 from boreal_env import BorealEnv, BorealVectorEnv, Objective, Observed, Reward
-from cleanrl_style.flags import parse
+from cleanrl_style.flags import fail, parse
 from sim.task.observation import observation_rows
 
 #: Key of the last step's info -> (unit, meaning).
@@ -149,4 +149,7 @@ class Args:
 
 
 if __name__ == "__main__":
-    parse(Args).path.write_text(page(), encoding="utf-8")
+    args = parse(Args)
+    if not args.path.parent.is_dir():
+        fail(f"--path {args.path}: there is no folder {args.path.parent}")
+    args.path.write_text(page(), encoding="utf-8")

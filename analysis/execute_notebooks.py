@@ -54,6 +54,9 @@ def shown(notebook: nbformat.NotebookNode) -> list[str]:
 
 def main(args: Args) -> None:
     """Run them; write them, or compare."""
+    for path in args.notebooks:
+        if not path.is_file():
+            protocol.fail(f"--notebooks {path}: there is no such file")
     protocol.compile_physics(KERNELS)  # so that no notebook shows that it compiles
     stale = []
     for path in args.notebooks:

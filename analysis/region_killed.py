@@ -116,9 +116,8 @@ def run(args: Args, folder: Path) -> pd.DataFrame:
 
 def main(args: Args) -> None:
     """Simulate, kill, compare and write."""
-    for name, least in (("stands", 1), ("years", 1), ("kills", 0)):
-        if getattr(args, name) < least:
-            protocol.fail(f"--{name} {getattr(args, name)}: at least {least} is needed")
+    if not 1 <= args.step_minutes <= 120 or 1440 % args.step_minutes:
+        protocol.fail(f"--step-minutes {args.step_minutes}: a divisor of 1440 of at most 120 is allowed")
     if args.quick:
         args.stands = 12
     with tempfile.TemporaryDirectory() as folder:

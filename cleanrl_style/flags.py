@@ -45,6 +45,13 @@ LIMITS = {
     "population": (4, MAX_ENVS),
     "episodes_each": (1, MAX_ENVS),
     "block_years": (1, 10**6),
+    "sites": (1, 10**6),
+    "first_site": (0, 10**9),
+    "stands": (1, 10**9),
+    "years": (1, 1000),
+    "spacing": (0.01, 10),
+    "kills": (0, 1000),
+    "workers": (1, 10**4),
 }
 
 

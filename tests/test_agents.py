@@ -1,5 +1,7 @@
 """A trained policy, loaded again from its run's folder, plays as it did in the run's own evaluation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -50,6 +52,20 @@ def test_an_agent_of_another_network_is_refused(tmp_path):
         ValueError, match="ppo_group.pt: another version of ppo_group.py than .*ppo_gated.py trained it"
     ):
         protocol.load_policy("ppo_group", script=ROOT / "cleanrl_style" / "ppo_gated.py")
+
+
+def test_an_environment_that_is_not_registered_here_is_named():
+    policy = protocol.load_policy("ppo_group")
+    elsewhere = replace(policy, arguments={**policy.arguments, "env_id": "nobodys-v0"})
+    with pytest.raises(ValueError, match="ppo_group: --env-id nobodys-v0: .*allowed: boreal-"):
+        elsewhere.task()
+
+
+def test_a_module_that_python_cannot_read_is_named(tmp_path, monkeypatch):
+    (tmp_path / "unreadable.py").write_text("import gymnasium\ndef make(:\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SystemExit, match="--env-id unreadable:x-v0: .*unreadable.py, line 2: "):
+        run_script("cleanrl_style/ppo_gated.py", "--env-id", "unreadable:x-v0", "--run-dir", tmp_path / "run")
 
 
 def test_returns_of_another_number_of_objectives_are_refused():

@@ -121,8 +121,8 @@ def test_a_finished_front_is_not_searched_again(tmp_path, monkeypatch, capsys):
 
 
 def test_refusals(capsys):
-    with pytest.raises(SystemExit, match="--sites 0: 1 to 400 are"):
-        run_script("analysis/studies/fronts.py", "--sites", 0)
+    with pytest.raises(SystemExit, match="--sites 401: 1 to 400 are"):
+        run_script("analysis/studies/fronts.py", "--sites", 401)
 
 
 def test_figure(tmp_path):

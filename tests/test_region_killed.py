@@ -15,6 +15,6 @@ def test_a_small_region_is_killed_and_the_page_says_what_came_of_it(tmp_path, mo
     assert "the same bytes as a run that was left alone" in said
 
 
-def test_no_stands_are_refused():
-    with pytest.raises(SystemExit, match="--stands 0: at least 1 is needed"):
-        region_killed.main(region_killed.Args(stands=0))
+def test_a_step_that_does_not_divide_a_day_is_refused():
+    with pytest.raises(SystemExit, match="--step-minutes 7: a divisor of 1440 of at most 120 is allowed"):
+        region_killed.main(region_killed.Args(step_minutes=7))

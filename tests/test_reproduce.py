@@ -119,6 +119,11 @@ def test_list_prints_the_commands(capsys):
     ]
 
 
+def test_a_seed_that_no_experiment_has_is_refused():
+    with pytest.raises(SystemExit, match="--seeds 99: allowed are 1, 2, 3"):
+        run_script("analysis/reproduce.py", "--list", "--seeds", "99")
+
+
 def test_what_trains_nothing_can_be_run_alone(capsys):
     run_script("analysis/reproduce.py", "--list", "--only", "main", "balanced", "--untrained")
     strategies = [f"python baselines_heuristic/{script}.py" for script in methods.STRATEGIES]

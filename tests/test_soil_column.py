@@ -158,5 +158,5 @@ def test_grids_reach_the_boundary():
 
 @pytest.mark.parametrize("flag", [("--sites", 0), ("--years", 0), ("--first-site", -1)])
 def test_bad_arguments_are_named(flag):
-    with pytest.raises(SystemExit, match="are allowed"):
+    with pytest.raises(SystemExit, match="must lie in"):
         run_script("analysis/validation/soil_column.py", *flag)

@@ -204,8 +204,8 @@ def test_quick_run_writes_the_same_bytes_twice(tmp_path, capsys):
 
 
 def test_refusals_are_one_line(tmp_path):
-    with pytest.raises(SystemExit, match="--sites of at least 1 is allowed, not 0"):
-        run_script("analysis/validate.py", "--sites", "0")
+    with pytest.raises(SystemExit, match="--free-sites of at least 1 is allowed, not 0"):
+        run_script("analysis/validate.py", "--free-sites", "0")
     (tmp_path / "file").write_text("")
     with pytest.raises(SystemExit, match="a writable folder is needed"):
         run_script("analysis/validate.py", "--quick", "--parts", "towers", "--output-dir", tmp_path / "file")

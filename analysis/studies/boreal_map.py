@@ -250,6 +250,8 @@ def main(args: Args) -> None:
         return
     if args.quick:
         args.spacing, args.years = 4.0, 3
+    if args.climate is not None and not args.climate.exists():
+        protocol.fail(f"--climate {args.climate}: there is no such file")
     name, env_id, policy = policy_of(args)
     if env_id not in boreal_env.REGISTERED:
         protocol.fail(f"--env-id {env_id}: allowed are {', '.join(boreal_env.REGISTERED)}")

@@ -67,9 +67,12 @@ class Policy:
         return self.arguments["env_id"]
 
     def task(self) -> Task:
-        """That environment with the arguments of its training; `task().make()` is one."""
+        """That environment with the arguments of its training; `task().make()` is one. ValueError if it is not here."""
         arguments = SimpleNamespace(**{**self.arguments, "scalarization": "linear", "ideal_point": None})
-        return make_task(arguments, hide_site=self.arguments.get("hide_site", False))
+        try:
+            return make_task(arguments, hide_site=self.arguments.get("hide_site", False))
+        except SystemExit as end:  # as a script ends; this is none
+            raise ValueError(f"{self.name}: {str(end).removeprefix('error: ')}") from end
 
 
 def load_policy(run_or_name, script=None) -> Policy:

@@ -114,6 +114,8 @@ def ask(env_id: str, flag: str = "--env-id", **env_kwargs) -> Task:
         return Task.of(env_id, **env_kwargs)
     except (gym.error.Error, ModuleNotFoundError) as error:
         fail(f"{flag} {env_id}: {str(error).splitlines()[0]}; {allowed}")
+    except SyntaxError as error:
+        fail(f"{flag} {env_id}: {error.filename}, line {error.lineno}: {error.msg}")
     except ValueError as error:
         fail(f"{flag} {env_id}: {error}")
 
