@@ -53,10 +53,10 @@ def measure(task: protocol.Task, test: list[int], validation: list[int]) -> pd.D
 
 def main(args: Args) -> None:
     """Measure what is missing or of another physics."""
-    most = len(sites.published_seeds("test"))
-    if args.episodes is not None and not 1 <= args.episodes <= most:
-        protocol.fail(f"--episodes {args.episodes}: 1 to {most} are allowed")
-    test = list(sites.published_seeds("test"))[: args.episodes]
+    test = list(sites.published_seeds("test"))
+    if args.episodes is not None and not 1 <= args.episodes <= len(test):
+        protocol.fail(f"--episodes {args.episodes}: 1 to {len(test)} are allowed")
+    test = test[: args.episodes]
     validation = list(sites.published_seeds("validation"))[: course.STANDS]  # of a training's course
     for env_id in ENVIRONMENTS:
         task, path = protocol.Task.of(env_id), args.folder / f"{env_id}.csv.gz"

@@ -26,7 +26,7 @@ from analysis import paths
 from boreal_env import BALANCED_WORLD
 from cleanrl_style import protocol
 from sim.block import lanes_for
-from sim.stands import available_cores
+from sim.stands import LONGEST_STEP_MINUTES, available_cores
 from sim.task import many
 
 POLICY = "ppo_group-balanced"
@@ -116,8 +116,10 @@ def run(args: Args, folder: Path) -> pd.DataFrame:
 
 def main(args: Args) -> None:
     """Simulate, kill, compare and write."""
-    if not 1 <= args.step_minutes <= 120 or 1440 % args.step_minutes:
-        protocol.fail(f"--step-minutes {args.step_minutes}: a divisor of 1440 of at most 120 is allowed")
+    if not 1 <= args.step_minutes <= LONGEST_STEP_MINUTES or 1440 % args.step_minutes:
+        protocol.fail(
+            f"--step-minutes {args.step_minutes}: a divisor of 1440 of at most {LONGEST_STEP_MINUTES} is allowed"
+        )
     if args.quick:
         args.stands = 12
     with tempfile.TemporaryDirectory() as folder:

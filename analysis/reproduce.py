@@ -81,7 +81,7 @@ def finished_configs(*roots: Path) -> list[dict]:
 def main(args: Args) -> None:
     """Run what is not finished, archive it, and make tables, figures and the documents that show results."""
     seeds = None if args.seeds is None else list(args.seeds)
-    known = {job.flags["seed"] for job in experiments.jobs(args.only) if "seed" in job.flags}
+    known = {job.flags["seed"] for job in experiments.jobs() if "seed" in job.flags}
     for seed in sorted(set(seeds or ()) - known):
         protocol.fail(f"--seeds {seed}: allowed are {', '.join(map(str, sorted(known)))}")
     jobs = experiments.quick_jobs(args.only) if args.quick else experiments.jobs(args.only, seeds)

@@ -251,6 +251,7 @@ def test_seeds_that_tell_a_difference():
     assert metrics.seeds_to_tell(values, difference=0.1) == 17
     assert metrics.seeds_to_tell(values, difference=0.2) == 6
     assert metrics.seeds_to_tell([1.0, 1.0]) == 2 and np.isnan(metrics.seeds_to_tell([1.0]))
+    assert 1000 < metrics.seeds_to_tell([-1.0, 1.0]) < 10_000 and metrics.seeds_to_tell([-9.0, 9.0]) == np.inf
 
 
 def test_gains_of_sites_and_plans():
