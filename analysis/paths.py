@@ -3,6 +3,7 @@
 from pathlib import Path
 
 QUICK = "quick"  # folder of what `reproduce.py --quick` makes, which are no results
+REPOSITORY = Path(__file__).parents[1]
 
 
 def runs(quick: bool = False) -> Path:
@@ -23,3 +24,8 @@ def archive(quick: bool = False) -> Path:
 def studies(quick: bool = False) -> Path:
     """Folder of the studies' tables."""
     return results(quick) / "studies"
+
+
+def there(folder: Path) -> Path:
+    """Where a folder of results is read from: the repository's, if there is none where the command is started."""
+    return folder if folder.is_dir() or QUICK in folder.parts else REPOSITORY / folder

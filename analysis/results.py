@@ -99,7 +99,8 @@ class Results:
             if not root.is_dir():
                 protocol.fail(f"--runs-dir {root}: no such folder")
         jobs = experiments.quick_jobs() if quick else experiments.jobs()
-        return Results(roots or (paths.archive(quick), paths.runs(quick)), jobs, paths.studies(quick))
+        archive, studies = paths.there(paths.archive(quick)), paths.there(paths.studies(quick))
+        return Results(roots or (archive, paths.runs(quick)), jobs, studies)
 
     @cached_property
     def rows(self) -> dict[tuple, list[Replicate]]:

@@ -74,7 +74,11 @@ def shipped_policies() -> dict[str, Path]:
 
 
 def policy_file(run_or_name) -> Path:
-    """The file of a policy: of a run's folder, the file itself, or of a name that ships. FileNotFoundError if none."""
+    """The file of a policy: of a run's folder, the file itself, or of a name that ships. FileNotFoundError if none,
+    ValueError for what is no name.
+    """
+    if not isinstance(run_or_name, (str, os.PathLike)):
+        raise ValueError(f"policy {run_or_name!r}: a run's folder, a file, or the name of one that ships is allowed")
     path, ships = Path(run_or_name), shipped_policies()
     if path.is_dir():
         path = path / POLICY
@@ -120,6 +124,8 @@ def parse(arguments: type):
             raise
         fail(message_of(errors.getvalue()))
     check_limits(args)
+    if isinstance(getattr(args, "env_id", None), str):
+        check_environment(args.env_id)
     return args
 
 
@@ -139,6 +145,8 @@ def check_limits(args) -> None:
         for number in flat(value):
             if not low <= number <= high:
                 fail(f"--{name.replace('_', '-')} must lie in [{low}, {high}], not {number}")
+    if getattr(args, "run_dir", None) == "":
+        fail("--run-dir '': the name of a folder is allowed")
     if not hasattr(args, "num_envs"):
         return
     fill_in_envs(args)
@@ -152,6 +160,30 @@ def check_limits(args) -> None:
     steps = getattr(args, "total_timesteps", None)
     if steps is not None and steps < args.num_envs:
         fail(f"--total-timesteps {steps} must be at least --num-envs {args.num_envs}")
+
+
+def check_environment(env_id: str) -> None:
+    """End the script with one line if there is no environment of that name; one of a module is asked for later."""
+    import gymnasium as gym
+
+    import boreal_env  # noqa: F401, it registers ours
+
+    if ":" in env_id:
+        return
+    if env_id not in gym.registry and f"{env_id}-v0" in gym.registry:
+        fail(f"--env-id {env_id}: give the version, {env_id}-v0")
+    try:
+        gym.spec(env_id)
+    except gym.error.Error as error:
+        fail(f"--env-id {env_id}: {no_environment(error)}")
+
+
+def no_environment(error: Exception) -> str:
+    """What is wrong with an environment's name, and which are allowed."""
+    import gymnasium as gym
+
+    ours = ", ".join(name for name in gym.registry if name.startswith("boreal-"))
+    return f"{str(error).splitlines()[0]}; allowed: {ours}, or module:id of an environment of yours"
 
 
 def fill_in_envs(args) -> None:

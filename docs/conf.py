@@ -7,6 +7,7 @@ repository, from which the pages below are taken, and nothing has to be rewritte
 import ast
 import importlib
 import inspect
+import json
 import re
 import sys
 import tomllib
@@ -59,12 +60,18 @@ PARAMETER = re.compile(r"(\w+(?:, \w+)*) : ")
 
 
 def as_myst(app, docname, source):
-    """Anchors as GitHub wants them become those that MyST links to; a list of pages is of those that are there."""
+    """Anchors as GitHub wants them become those that MyST links to; a list of pages is of those that are there; a
+    notebook's page ends with the notebook itself."""
     text = ANCHOR.sub(r"(\1)=", source[0])
     if docname == root_doc:
         patterns = re.findall(r"^\S+\*$", text, re.MULTILINE)
         for pattern in (pattern for pattern in patterns if not any(Path(__file__).parent.glob(pattern + ".*"))):
             text = text.replace(f"{pattern}\n", "")
+    file = ROOT / f"{docname}.ipynb"
+    if file.exists():
+        notebook = json.loads(text)
+        last = {"cell_type": "markdown", "metadata": {}, "source": f"{{download}}`{file.name} <{file.name}>`"}
+        text = json.dumps({**notebook, "cells": [*notebook["cells"], last]})
     source[0] = re.sub(r"(\.\. automodule:: (\S+)\n(?: +:.*\n)+)", lambda found: found[1] + others(found[2]), text)
 
 

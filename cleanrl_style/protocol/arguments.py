@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 import boreal_env
-from cleanrl_style.flags import check_limits, fail, fill_in_envs
+from cleanrl_style.flags import check_environment, check_limits, fail, fill_in_envs, no_environment
 from cleanrl_style.protocol.fronts import evaluation_weights, return_columns
 from cleanrl_style.protocol.reference import reference_returns
 from cleanrl_style.protocol.sites import evaluation_seeds, published_seeds
@@ -99,21 +99,18 @@ def name_environment(args) -> str:
     if args.env_id is None:
         return "boreal-site-specific-v0" if args.mode == "site-specific" else "boreal-generalist-v0"
     env_id = args.env_id.removeprefix("boreal_env:")
-    if env_id not in gym.registry and f"{env_id}-v0" in gym.registry:
-        fail(f"--env-id {env_id}: give the version, {env_id}-v0")
+    check_environment(env_id)
     return env_id
 
 
 def ask(env_id: str, flag: str = "--env-id", **env_kwargs) -> Task:
     """The environment's answers; exits with one line if there is none, or one that the scripts cannot handle."""
-    ours = ", ".join(name for name in gym.registry if name.startswith("boreal-"))
-    allowed = f"allowed: {ours}, or module:id of an environment of yours"
     if env_id.count(":") > 1 or not all(env_id.split(":")):
-        fail(f"{flag} {env_id!r}; {allowed}")
+        fail(f"{flag} {no_environment(ValueError(repr(env_id)))}")
     try:
         return Task.of(env_id, **env_kwargs)
     except (gym.error.Error, ModuleNotFoundError) as error:
-        fail(f"{flag} {env_id}: {str(error).splitlines()[0]}; {allowed}")
+        fail(f"{flag} {env_id}: {no_environment(error)}")
     except SyntaxError as error:
         fail(f"{flag} {env_id}: {error.filename}, line {error.lineno}: {error.msg}")
     except ValueError as error:
