@@ -151,6 +151,7 @@ def run(command: tuple[str, str, tuple[str, ...]]) -> tuple[int, str]:
     folder, log, words = command
     Path(log).parent.mkdir(parents=True, exist_ok=True)
     status = -signal.SIGKILL
+    Path(log).unlink(missing_ok=True)
     with own_core() as core:
         for _ in range(1 + RETRIES):
             if _STOPPED.is_set() or (status >= 0 and status != INTERRUPTED):
@@ -161,7 +162,7 @@ def run(command: tuple[str, str, tuple[str, ...]]) -> tuple[int, str]:
 
 def run_once(folder: str, log: Path, words: tuple[str, ...], core: int | None) -> int:
     """Run a command until it ends or is ended; its exit status, below 0 for a signal."""
-    with log.open("wb") as output:
+    with log.open("ab") as output:  # what an attempt that was killed has said stays
         process = subprocess.Popen(
             [sys.executable, "-m", "analysis.tied", "any" if core is None else str(core), *words],
             stdin=subprocess.PIPE,  # closes when this process ends, however it does

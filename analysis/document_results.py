@@ -19,8 +19,9 @@ import sim
 from analysis import excerpts, experiments, generalisation, main_points, methods, metrics, paths, stored
 from analysis.experiments import BALANCED, GENERALIST
 from analysis.figures import learning_asymmetry, learning_curves, learning_difficulty
+from analysis.paper_claims.claim import FEWEST_SEEDS
 from analysis.results import Results
-from analysis.tables import best_known, main_results, runtime, single_sites
+from analysis.tables import best_known, group_choices, main_results, runtime, single_sites
 from analysis.tables import learning_difficulty as difficulty_table
 from analysis.tables.common import has_numbers, over_seeds
 from cleanrl_style import protocol
@@ -222,6 +223,23 @@ def difficulty(results: Results) -> str:
     return excerpts.markdown(list(difficulty_table.COLUMNS.values()), cells)
 
 
+def choices(results: Results) -> str:
+    """Group PPO with one choice changed less the default, bold where the interval of five seeds and more lacks 0."""
+    table = group_choices.make(results)
+    if not has_numbers(table, group_choices.COLUMNS):
+        return not_run("main", "group", "budgets")
+    decimals = {"score_greedy": 1, "score_sampled": 1} | dict.fromkeys(group_choices.CHANGES, 2)
+    rows = []
+    for row in table[table.seeds > 0].to_dict("records"):
+        cells = cells_of(row, decimals)
+        for k, name in enumerate(decimals):
+            told = row[f"{name}_low"] > 0.0 or row[f"{name}_high"] < 0.0
+            cells[k] = f"**{cells[k]}**" if told and row["seeds"] >= FEWEST_SEEDS else cells[k]
+        rows.append([flags(row["setting"]), str(row["seeds"]), *cells])
+    header = [group_choices.COLUMNS[name] for name in ("setting", "seeds", *decimals)]
+    return excerpts.markdown(header, rows)
+
+
 def sites_alone(results: Results) -> str:
     """Gains of agents of one objective on each of the single sites, and of the best constant plan there."""
     columns, table = single_sites.COLUMNS, single_sites.make(results)
@@ -358,6 +376,7 @@ TABLES = {
     "splits": splits,
     "generalisation": on_other_sites,
     "difficulty": difficulty,
+    "group_choices": choices,
     **{f"figure_{name}": figure_of(name) for name in FIGURES},
 }
 EXCERPTS = {

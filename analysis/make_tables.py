@@ -24,6 +24,7 @@ from analysis.tables import (
     best_known,
     curriculum_selection,
     detailed_objectives,
+    group_choices,
     growing_season_correlations,
     lambda_violations,
     learned_strategies,
@@ -53,6 +54,7 @@ TABLES = (
     learning_difficulty,
     single_sites,
     best_known,
+    group_choices,
 )
 
 EXPLANATION = """Score: 0 is to do nothing, 100 the best constant plan of each weight. Interquartile mean over training

@@ -104,9 +104,9 @@ def violations_or_ties_percent(returns: np.ndarray) -> float:
 
 
 def significant_violations_percent(evaluation: pd.DataFrame) -> float:
-    """The same, counting only changes larger than their paired 95 % interval [%]."""
+    """The same, counting only changes larger than their paired 95 % interval [%]; of one episode NaN."""
     _, returns = paired_returns(evaluation)
-    if returns.shape[1] < 2:
+    if min(returns.shape[:2]) < 2:
         return np.nan
     change, half_width = mean_interval(np.diff(returns, axis=1))
     return 100 * float(_violates(change, half_width).mean())

@@ -178,5 +178,6 @@ def selection(episodes: pd.DataFrame) -> pd.DataFrame:
 
 
 def timing(table: pd.DataFrame) -> pd.DataFrame:
-    """Seconds of each phase."""
-    return table.groupby("phase", sort=False).seconds.sum().reset_index()
+    """Seconds of each phase; of steps that a killed run made twice, the last time."""
+    made = table.drop_duplicates(["phase", "global_step"], keep="last")
+    return made.groupby("phase", sort=False).seconds.sum().reset_index()

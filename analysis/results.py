@@ -110,7 +110,11 @@ class Results:
             row = rows.setdefault((run.script, run.arguments["env_id"], run.setting), {})
             row.setdefault((run.arguments["seed"], run.arguments["site_seed"]), []).append(run)
         return {
-            key: [self._replicate(*item) for item in sorted(row.items(), key=str) if self._complete(key, *item)]
+            key: [
+                self._replicate(*item)
+                for item in sorted(row.items(), key=lambda item: str(item[0]))
+                if self._complete(key, *item)
+            ]
             for key, row in rows.items()
         }
 

@@ -146,9 +146,11 @@ def read_run(folder: Path) -> Run:
     """A run; ValueError says why it cannot be used."""
     config = read_config(folder)
     if (folder / ARCHIVED).exists():
-        run = Run(folder, config, read_archived(folder))
-        check(run.tables["evaluation"], config)
-        return run
+        tables = read_archived(folder)
+        if "evaluation" not in tables:
+            raise ValueError(f"damaged: {ARCHIVED} has no evaluation.csv")
+        check(tables["evaluation"], config)
+        return Run(folder, config, tables)
     steps = config["arguments"].get("total_timesteps")
     tables = read_whole(folder, steps is not None)
     check(tables["evaluation"], config)
@@ -156,7 +158,7 @@ def read_run(folder: Path) -> Run:
         check_training(tables, config["arguments"])
     try:
         return Run(folder, config, reduction.reduce(tables, steps, primary_of(config)))
-    except (KeyError, TypeError) as error:
+    except (AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"damaged: a table lacks a column ({error})") from error
 
 
@@ -211,9 +213,10 @@ def run_folders(root: Path, *files: str) -> list[Path]:
 def read_runs(*roots: Path) -> tuple[list[Run], list[str]]:
     """All usable runs below the folders, and one line for each that was left out.
 
-    The same run below two of the folders counts once, the first; twice below one folder it is reported.
+    The same run below two of the folders counts once, the first, unless they differ and the other alone is of this
+    checkout's physics; differing, or twice below one folder, it is reported.
     """
-    runs, left_out, seen = [], [], {}
+    found, left_out, roots_of = {}, [], {}
     for root in roots:
         with_config = run_folders(root)
         nameless = sorted({*run_folders(root, "evaluation.csv", ARCHIVED)} - {*with_config})
@@ -224,9 +227,19 @@ def read_runs(*roots: Path) -> tuple[list[Run], list[str]]:
             except ValueError as error:
                 left_out.append(f"{folder}: {error}")
                 continue
-            first_root, first_folder = seen.setdefault(identity(run.config), (root, folder))
-            if first_folder == folder:
-                runs.append(run)
-            elif first_root == root:
-                left_out.append(f"{folder}: the same run as {first_folder}")
-    return runs, left_out
+            name = identity(run.config)
+            first = found.setdefault(name, run)
+            if first is run:
+                roots_of[name] = root
+            elif roots_of[name] == root:
+                left_out.append(f"{folder}: the same run as {first.folder}")
+            elif not first.evaluation.equals(run.evaluation):
+                found[name] = run if is_of_this_physics(run) and not is_of_this_physics(first) else first
+                other = first if found[name] is run else run
+                left_out.append(f"{other.folder}: other results than {found[name].folder}, which counts")
+    return list(found.values()), left_out
+
+
+def is_of_this_physics(run: Run) -> bool:
+    """Whether a run says that this checkout's simulator and environment have made it."""
+    return run.config.get("physics") == physics_name()

@@ -52,6 +52,26 @@ LIMITS = {
     "spacing": (0.01, 10),
     "kills": (0, 1000),
     "workers": (1, 10**4),
+    # of other libraries' algorithms
+    "batch_size": (2, 10**6),
+    "buffer_episodes": (1, 10**6),
+    "epsilon_decay_steps": (1, 10**9),
+    "exchange_every": (1, 10**9),
+    "gradient_updates": (1, 10**6),
+    "hidden_dim": (1, 10**5),
+    "homotopy_decay_steps": (1, 10**9),
+    "learning_starts": (1, 10**9),
+    "n_epochs": (1, 10**6),
+    "n_steps": (2, 10**9),
+    "num_er_episodes": (1, 10**6),
+    "num_model_updates": (1, 10**6),
+    "num_step_episodes": (1, 10**6),
+    "own_episodes": (1, 10**6),
+    "pop_size": (2, 1000),
+    "return_scale": (1e-6, 10**6),
+    "target_entropy_scale": (0, 1),
+    "target_net_update_freq": (1, 10**9),
+    "timesteps_per_iter": (1, 10**9),
 }
 
 
@@ -97,16 +117,19 @@ def describe(arguments: type) -> str:
     if not hasattr(arguments, "total_timesteps"):
         return arguments.__doc__
     # a script that updates after every episode has one stand at a time, which takes five times as long
-    steps, whole = (6000, "forty minutes") if getattr(arguments, "num_envs", None) == 1 else (32000, "ten minutes")
+    usual = (6000, "forty minutes") if getattr(arguments, "num_envs", None) == 1 else (32000, "ten minutes")
+    steps, whole = getattr(arguments, "trial", usual)
+    lockstep = " --vectorization lockstep" if hasattr(arguments, "vectorization") else ""
+    left = """A stopped run goes on with the same
+command, to the same bytes. The folder gets config.json, episodes.csv, updates.csv, validation.csv (of 22,500 steps
+and more), evaluation.csv, policy.pt and summary.png, which docs/algorithms explains"""
     return f"""{arguments.__doc__}
 
-    python {sys.argv[0]} --vectorization lockstep --total-timesteps {steps} --eval-episodes 20
+    python {sys.argv[0]}{lockstep} --total-timesteps {steps} --eval-episodes 20
 
 is a trial: a minute on two cores once the physics is compiled, too short to learn much. Without the last two flags
-it trains for 300,000 steps and is evaluated on 200 sites, for {whole}. A stopped run goes on with the same
-command, to the same bytes. The folder gets config.json, episodes.csv, updates.csv, validation.csv (of 22,500 steps
-and more), evaluation.csv, policy.pt and summary.png, which docs/algorithms explains; python analysis/make_tables.py
-sets it beside other runs."""
+it trains for 300,000 steps and is evaluated on 200 sites, for {whole}. {getattr(arguments, "left", left)}; python
+analysis/make_tables.py sets it beside other runs."""
 
 
 def parse(arguments: type):

@@ -57,6 +57,7 @@ class Args:
     """project of Weights & Biases"""
 
     num_envs = 1  # no flag: population x episodes_each
+    trial = 12000, "ten minutes"  # a generation; what `--help` says
 
 
 if __name__ == "__main__":

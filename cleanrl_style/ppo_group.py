@@ -268,6 +268,8 @@ if __name__ == "__main__":
     if args.scalarization == "chebyshev":
         protocol.fail("--scalarization chebyshev: each objective has an advantage of its own here; linear is allowed")
     task = protocol.make_task(args, hide_site=args.hide_site)
+    if args.num_envs == 1 and 1 in (args.rollout_steps, args.total_timesteps % args.rollout_steps):
+        protocol.fail(f"--total-timesteps {args.total_timesteps}: a rollout of one step has no deviation to divide by")
     episode_columns = task.episode_columns
     gae_lambda = args.gae_lambda or [1.0 if name == "thaw" else 0.95 for name in task.objectives]
     if len(gae_lambda) not in (1, task.num_objectives):

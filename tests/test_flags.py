@@ -1,6 +1,8 @@
 """What a script says at once: of a bad flag, of a missing package, of a terminal that cannot take its output."""
 
+import importlib
 import os
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -9,6 +11,7 @@ from pathlib import Path
 import pytest
 from scripts import ROOT, run_script
 
+from analysis.outside import common
 from cleanrl_style import flags
 
 SCRIPTS = sorted(path.stem for path in (ROOT / "cleanrl_style").glob("*.py") if "\nclass Agent" in path.read_text())
@@ -53,6 +56,12 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
 @pytest.mark.parametrize(
     "given, message",
     [
+        (["--run-dir", ""], "--run-dir '': the name of a folder is allowed"),
+        (
+            ["--env-id", "boreal-v9"],
+            "--env-id boreal-v9: Environment `boreal` doesn't exist.*allowed: boreal-generalist.*",
+        ),
+        (["--env-id", "boreal-balanced"], "--env-id boreal-balanced: give the version, boreal-balanced-v0"),
         (["--seed", "-1"], r"--seed must lie in \[0, 999999\], not -1"),
         (["--eval-weights", "0", "2"], r"--eval-weights must lie in \[0, 1\], not 2.0"),
         (["--learning-rate", "nan"], r"--learning-rate must lie in \[0, 1\], not nan"),
@@ -110,3 +119,20 @@ def test_a_script_without_a_terminal_works(monkeypatch):
     monkeypatch.setattr(sys, "stdout", None)
     monkeypatch.setattr(sys, "argv", ["script.py", "--seed", "2"])
     assert flags.parse(Args).seed == 2
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_the_trial_that_help_shows_can_be_made(monkeypatch, script):
+    module = importlib.import_module(f"cleanrl_style.{script}")
+    monkeypatch.setattr(sys, "argv", [f"cleanrl_style/{script}.py"])
+    (words,) = re.findall(rf"python cleanrl_style/{script}.py (--.*)", flags.describe(module.Args))
+    monkeypatch.setattr(sys, "argv", [f"cleanrl_style/{script}.py", *words.split()])
+    args = flags.parse(module.Args)
+    assert args.vectorization == "lockstep" and args.eval_episodes == 20
+    generation = getattr(args, "population", 0) * 8 * 50  # of the search, eight episodes a candidate
+    assert args.total_timesteps >= generation
+
+
+def test_what_help_says_of_another_librarys_algorithm():
+    text = flags.describe(common.Args)
+    assert "lockstep" not in text and "starts over" in text and "updates.csv" not in text

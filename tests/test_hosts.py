@@ -10,11 +10,15 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode
 from playing import QUICK, assert_same
 
+import boreal_env
 from cleanrl_style import protocol
 from cleanrl_style.protocol import training_envs
 
 gym.register("hosted-v0", entry_point="boreal_env:BorealEnv", kwargs={**QUICK, "record_years": True})
 gym.register("limited-v0", entry_point="boreal_env:BorealEnv", kwargs=QUICK, max_episode_steps=2)
+OWN = boreal_env.Objective("harvest", lambda year: year["harvest_kgc_m2"], 0.0, 20.0)
+SETTLED = {"fixed_preference": [0.2, 0.3, 0.5], "objectives": ("carbon", "thaw", OWN), "scenario": "ssp245"}
+gym.register("settled-v0", entry_point="boreal_env:BorealEnv", kwargs={**QUICK, **SETTLED})
 TASK = protocol.Task.of("hosted-v0")
 NUMBER = 8
 ACTIONS = np.random.default_rng(1).integers(0, 25, (10, NUMBER))
@@ -67,17 +71,24 @@ def test_a_script_sees_what_it_sees_of_a_worker_each(make, cores, workers):
     assert_same(envs.reset()[0], others.reset()[0])
 
 
-def test_states_are_of_streams_whatever_the_workers(make):
-    """A run goes on where there are more cores, or fewer."""
-    envs, others, resumed = make(3), make(None), make(2)
+@pytest.mark.parametrize("env_id", ["hosted-v0", "settled-v0"])
+def test_states_are_of_streams_whatever_the_workers(make, env_id):
+    """A run goes on where there are more cores, or fewer; whatever arguments its environments have."""
+    task = protocol.Task.of(env_id)
+    envs, others, resumed, alone = make(3, task), make(None, task), make(2, task), make(NUMBER, task)
     for one in (envs, others):
         one.reset(seed=3)
     assert_same_steps(envs, others, ACTIONS[:2])
     states = training_envs.get_states(envs)
     assert pickle.dumps(states[5]) == pickle.dumps(others.call("get_state")[5])
     assert len(states) == NUMBER
-    training_envs.set_states(resumed, pickle.loads(pickle.dumps(states)))
-    assert_same_steps(resumed, others)
+    for others_to_be in (resumed, alone):
+        training_envs.set_states(others_to_be, pickle.loads(pickle.dumps(states)))
+    for row in ACTIONS:
+        expected = others.step(row)
+        for one in (resumed, alone):
+            for result, other in zip(one.step(row), expected, strict=True):
+                assert_same(result, other)
 
 
 def test_a_wrapped_environment_has_a_worker_for_itself(make):

@@ -1,3 +1,4 @@
+import json
 import re
 import shutil
 from itertools import product
@@ -16,6 +17,7 @@ from analysis.studies.signal_to_noise import CONTRASTS
 from analysis.tables import (
     best_known,
     curriculum_selection,
+    group_choices,
     growing_season_correlations,
     learning_difficulty,
     physical_conflicts,
@@ -24,6 +26,7 @@ from analysis.tables import (
 )
 from analysis.tables.common import FORMATS, has_numbers
 from cleanrl_style.protocol.fronts import simplex_lattice
+from cleanrl_style.protocol.reference import physics_name
 
 ROOT = Path(__file__).parents[1]
 MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")
@@ -129,7 +132,7 @@ def test_season_violations_runtime_details(tables):
 
 
 def test_all_tables_in_all_formats(tables):
-    assert len(make_tables.TABLES) == 13
+    assert len(make_tables.TABLES) == 14
     stems = [path.with_suffix("") for path in tables.glob("*.csv")]
     assert {stem.name for stem in stems} == {
         *("main_results", "detailed_objectives", "lambda_violations", "learned_strategies", "runtime", "warming_flux"),
@@ -262,7 +265,8 @@ def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):
 
 def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
     runs = tmp_path / "runs"
-    for name in ("good", "unfinished", "config", "truncated", "columns", "infinite", "partial", "broken-years", "twin"):
+    names = ("good", "unfinished", "config", "truncated", "columns", "infinite", "partial", "broken-years", "twin")
+    for name in (*names, "without-any-steps"):
         write_run(runs / name, "ppo_curriculum", seed=1 if name == "twin" else len(name) + 20)
     write_run(runs / "zz-first", "ppo_curriculum", seed=1)
     (runs / "unfinished" / "evaluation.csv").unlink()
@@ -275,11 +279,13 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
         file = runs / name / "evaluation.csv"
         change(pd.read_csv(file)).to_csv(file, index=False)
     (runs / "partial" / "episodes.csv").unlink()
+    file = runs / "without-any-steps" / "episodes.csv"
+    pd.read_csv(file).drop(columns="global_step").to_csv(file, index=False)
     (runs / "broken-years" / "evaluation_years.csv").write_bytes(b"")
     table = make(runs, tmp_path / "tables")
     assert table.loc[("ppo_curriculum", "boreal-generalist-v0", "default")].seeds == 2
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 8
+    assert len(lines) == 9
     for name, reason in [
         ("unfinished", "no evaluation.csv"),
         ("config", "config.json"),
@@ -287,6 +293,7 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
         ("columns", "the returns of ['carbon'] lacks the column weight_carbon"),
         ("infinite", "not finite"),
         ("partial", "partial: it has no episodes.csv"),
+        ("without-any-steps", "damaged: a table lacks a column"),
         ("broken-years", "damaged: evaluation_years.csv"),
         ("zz-first", "the same run as"),
     ]:
@@ -318,6 +325,20 @@ def test_the_same_run_in_two_folders_counts_once(tmp_path, capsys):
     assert "left out" not in capsys.readouterr().err
 
 
+def test_of_two_that_differ_the_run_of_this_physics_counts(tmp_path, capsys):
+    """An older archive does not hide a run that was made anew."""
+    for name, carbon in (("archive", (0, 1, 2)), ("runs", (3, 4, 5))):
+        write_run(tmp_path / name / "run", "ppo_curriculum", carbon=carbon, vectorization="lockstep")
+    roots = (tmp_path / "archive", tmp_path / "runs")
+    for physics, counts, other in ((None, *roots), (physics_name(), *roots[::-1])):
+        config = roots[1] / "run" / "config.json"
+        config.write_text(json.dumps({**json.loads(config.read_text()), "physics": physics}))
+        make_tables.main(make_tables.Args(runs_dir=roots, tables_dir=tmp_path / "t"))
+        row = read(tmp_path / "t", "main_results", ["method", "environment", "setting"]).loc[MAIN]
+        assert row.seeds == 1 and row.scalarized == pytest.approx((5 if counts == roots[0] else 5 + 4.5) / 3)
+        assert f"left out: {other}/run: other results than {counts}/run, which counts" in capsys.readouterr().err
+
+
 def test_gains_need_zero_change_on_the_same_episodes(tmp_path, capsys):
     write_run(tmp_path / "runs" / "ours", "ppo_curriculum", vectorization="lockstep")
     write_run(tmp_path / "runs" / "zero", "zero_change", env_id="boreal-balanced-v0")
@@ -347,6 +368,29 @@ def test_the_score_of_both_policies(tmp_path, monkeypatch):
     assert row.gain_scalarized == pytest.approx((6.5 + 7) / 6) and row.seeds_to_tell == 23
     assert table.score_sampled["best_constant_mix", MAIN[1], "default"] == pytest.approx(100)
     assert table.score_sampled["zero_change"].dropna().tolist() == [0]
+
+
+def test_what_a_choice_of_group_ppo_is_worth(tmp_path):
+    """The changed one gains 2, 1 and 1 less at weights 0, 0.5 and 1, where the best constant plans have 4, 2 and 2."""
+    plans = [
+        {"env_id": MAIN[1], "action": action, "seed": seed, "carbon_return": c, "thaw_return": t}
+        for action, c, t in ((boreal_env.NO_CHANGE, 0, 0), (20, 2, 2), (24, 0, 4))
+        for seed in (0, 1)
+    ]
+    stored.write(tmp_path / "studies" / "constant_plans.csv", pd.DataFrame(plans), {})
+    flags = {"vectorization": "lockstep"}
+    for seed in (1, 2, 3):
+        write_run(tmp_path / f"default{seed}", "ppo_group", seed, (1, 2, 3), (5, 4, 3), **flags)
+    for seed in (2, 3):
+        write_run(tmp_path / f"changed{seed}", "ppo_group", seed, (2, 2, 2), (3, 2, 1), relabelings=0, **flags)
+    table = group_choices.make(Results((tmp_path,), experiments.jobs(), tmp_path / "studies"))
+    row = table.set_index("setting").loc["relabelings=0, vectorization=lockstep"]
+    assert row.seeds == 2
+    # mean loss of (2 + (0 + 2) / 2 + 1) / 3 of a mean (4 + 2 + 2) / 3 that the plans have; all sites and seeds alike
+    assert (row.score_greedy, row.score_greedy_low, row.score_greedy_high) == pytest.approx((-50, -50, -50))
+    assert row.score_sampled == pytest.approx(-50)
+    assert (row.carbon_change, row.thaw_change) == pytest.approx((-2, 0))  # 0 instead of 2, -2 as before
+    assert (table.seeds == 0).sum() == len(table) - 1
 
 
 def test_shares_of_the_best_known_plans(tmp_path, monkeypatch):

@@ -134,6 +134,8 @@ def test_only_consistent_violations_are_significant():
     table = evaluation(carbon, thaw, weights)
     assert metrics.violations_percent(metrics.mean_returns(table)) == 100
     assert metrics.significant_violations_percent(table) == 50
+    one_episode = table[table.seed == table.seed.iloc[0]]
+    assert np.isnan(metrics.significant_violations_percent(one_episode))  # has no interval
 
 
 def test_response_to_the_preference():

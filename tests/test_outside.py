@@ -102,4 +102,5 @@ def test_a_run_is_as_ours(tmp_path, script, env_id):
     assert 150 <= cost.steps <= 200 and cost.peak_memory_mb > 100
     assert len(pd.read_csv(folders[0] / "episodes.csv")) == cost.steps // 50
     assert json.loads((folders[0] / "config.json").read_text())["arguments"]["total_timesteps"] == 200
-    assert len({(folder / "evaluation.csv").read_bytes() for folder in folders}) == 1
+    for again in folders[1:]:  # of the two that are played twice
+        assert (again / "evaluation.csv").read_bytes() == (folders[0] / "evaluation.csv").read_bytes()

@@ -92,3 +92,11 @@ def test_only_the_primary_policy_has_more_than_returns():
     )
     kept = reduction.evaluation(table, "sampled")
     assert "episode" not in kept and kept.latent_heat_mj_m2.isna().tolist() == [True, False]
+
+
+def test_steps_that_a_killed_run_made_twice_are_timed_once():
+    rows = [("rollout", 100, 1.0), ("update", 100, 2.0), ("rollout", 200, 4.0), ("rollout", 200, 8.0)]
+    seconds = (
+        reduction.timing(pd.DataFrame(rows, columns=["phase", "global_step", "seconds"])).set_index("phase").seconds
+    )
+    assert seconds.to_dict() == {"rollout": 9.0, "update": 2.0}

@@ -307,5 +307,5 @@ def test_an_environment_without_a_state_starts_over(tmp_path, capsys):
     whole = {path: path.read_bytes() for path in tmp_path.iterdir() if path.name != "timing.csv"}
     (tmp_path / "evaluation.csv").unlink()
     run_script(*command)
-    assert "has no get_state(): the interrupted run starts over" in capsys.readouterr().out
+    assert "gives no state to go on from: the interrupted run starts over" in capsys.readouterr().out
     assert whole == {path: path.read_bytes() for path in tmp_path.iterdir() if path.name != "timing.csv"}

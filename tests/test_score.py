@@ -146,6 +146,15 @@ def test_a_table_of_another_physics_is_not_used_and_said_so(task, capsys):
     assert task.measured == [[0, 1]]  # then kept
 
 
+def test_kept_returns_that_are_damaged_are_measured_again(task, tmp_path):
+    for _ in range(2):
+        expected = reference.reference_returns(task, [0, 1])
+    (kept,) = (tmp_path / "cache" / reference.FOLDER).iterdir()
+    kept.write_bytes(kept.read_bytes()[:-20])
+    pd.testing.assert_frame_equal(reference.reference_returns(task, [0, 1]), expected, check_dtype=False)
+    assert task.measured == [[0, 1]] * 2 and list(kept.parent.iterdir()) == [kept]
+
+
 def test_other_episodes_and_environments_are_measured(task):
     ship(task, reference.fingerprint(task))
     reference.reference_returns(task, [0, 99])

@@ -19,6 +19,20 @@ gym.register("blind-v0", entry_point="boreal_env:BorealEnv", kwargs={"observatio
 gym.register("contrast-v0", entry_point="boreal_env:BorealEnv", kwargs={"thaw_formulation": "contrast", "years": 3})
 
 
+def test_a_time_limit_has_no_state_to_go_on_from():
+    """It counts the steps of an episode beside the environment: a run that was stopped starts over."""
+    limited, free = (gym.make("short-v0", max_episode_steps=steps) for steps in (2, None))
+    blocks = training_envs.split(1, 1)
+    states = [training_envs.InWorker(env, 0, blocks[0]).get_state() for env in (limited, free)]
+    assert states[0] is None and states[1] is not None
+
+
+def test_sites_of_another_kind_are_not_centred_by_ours():
+    task = protocol.Task("sites-v0", {}, ("carbon", "thaw"), site_entries=(43, 44, 45))
+    with pytest.raises(SystemExit, match="it observes 3 site parameters, ours 62.*--raw-selector"):
+        task.sample_sites(range(3))
+
+
 def test_ids_of_the_benchmark():
     task = protocol.Task.of("boreal-generalist-v0")
     assert (task.boreal, task.has_lockstep, task.mode, task.years) == (True, True, "generalist", 50)

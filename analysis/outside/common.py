@@ -51,6 +51,9 @@ class Args:
     """start over in a folder that already holds a run"""
 
     num_envs: ClassVar[int] = 1  # the libraries step one
+    trial: ClassVar = (2000, "half an hour to five hours")  # what `--help` says
+    left: ClassVar = """A stopped run starts over.
+The folder gets config.json, episodes.csv, cost.csv, evaluation.csv and summary.png, which docs/outside.md explains"""
 
 
 # ---------------------------------------------------------------------------------------------- the environment

@@ -17,6 +17,7 @@ import torch
 from sb3_contrib import MaskablePPO
 
 from analysis.outside.common import Args, Session, main
+from cleanrl_style import protocol
 
 
 @dataclass
@@ -60,6 +61,8 @@ def learn(session: Session):
     """Train an agent for each weight of the evaluation, one after the other."""
     args, task, agents = session.args, session.task, {}
     share = args.total_timesteps // len(args.eval_weights)
+    if share < 2:
+        protocol.fail(f"--total-timesteps {args.total_timesteps}: two or more for each of the weights are allowed")
     n_steps = min(args.n_steps, share)
     for number, given in enumerate(args.eval_weights):
         weights = task.check_weights(given)

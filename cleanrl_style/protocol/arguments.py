@@ -66,6 +66,8 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
         if importlib.util.find_spec(package) is None:
             fail(f"--track {package}: the package is not installed (pip install {package})")
     if getattr(args, "scalarization", "linear") == "chebyshev":
+        if any(scale != 1.0 for scale in getattr(args, "reward_scales", ())):
+            fail("--reward-scales: the ideal point of --scalarization chebyshev is of rewards as they are: 1 each")
         return dataclasses.replace(task, utility=Utility(ideal_point(task, args.ideal_point)))
     if getattr(args, "ideal_point", None) is not None:
         fail("--ideal-point is for --scalarization chebyshev")

@@ -42,7 +42,7 @@ class PlainLoop(gym.vector.VectorEnv):
 
     def __init__(self, task: Task, num_envs: int):
         self.num_envs, self.num_objectives = num_envs, task.num_objectives
-        self.envs = [task.make() for _ in range(num_envs)]
+        self.envs = [task.make(**kept_by(task)) for _ in range(num_envs)]
 
     def reset(self, *, seed: list[int], options: dict):
         """seed: one per environment; options: preference, one per environment."""
@@ -127,10 +127,13 @@ def play(task: Task, envs, policy, weights: np.ndarray, seeds: list[int], greedy
 
 
 def make_envs(task: Task, num_envs: int) -> gym.vector.VectorEnv:
-    """Environments in lockstep, ours with the annual record; else a plain loop."""
-    if not task.has_lockstep:
-        return PlainLoop(task, num_envs)
-    return task.make_lockstep(num_envs, **({"record_years": True} if task.boreal else {}))
+    """Environments in lockstep, else a plain loop; ours with the annual record."""
+    return task.make_lockstep(num_envs, **kept_by(task)) if task.has_lockstep else PlainLoop(task, num_envs)
+
+
+def kept_by(task: Task) -> dict:
+    """Arguments of an environment whose episodes keep the annual record, if it has one."""
+    return {"record_years": True} if task.boreal else {}
 
 
 def episodes_by_policy(task: Task, episodes: int, policies=POLICIES) -> dict[str, int]:
@@ -189,8 +192,8 @@ def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, spli
         for (kind, k, episode), seed, its_returns, report in zip(chunk, its_seeds, returns, reports, strict=True):
             if "years" in report:
                 records[kind, k].append(report.pop("years"))
-            if other_formulation:
-                report[ASYMMETRIC] = asymmetric_thaw_return(records[kind, k][-1])
+                if other_formulation:
+                    report[ASYMMETRIC] = asymmetric_thaw_return(records[kind, k][-1])
             score = task.returns_row(weights[k], its_returns)
             rows[kind, k, episode] = {"policy": kind, "episode": episode, "seed": seed, **score, **report}
         progress.show(len(rows))

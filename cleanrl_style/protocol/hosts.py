@@ -14,6 +14,8 @@ from gymnasium.vector.utils import batch_space
 
 from boreal_env import BorealEnv
 
+SETTINGS = "settings"  # of a state: the arguments of all its environments, which are alike
+
 
 def split(num_envs: int, cores: int) -> list[range]:
     """Environments of each worker: neighbours, in no more workers than there are cores."""
@@ -147,9 +149,9 @@ def info_of(infos: dict, i: int) -> dict:
 
 
 def row_of(state, i: int):
-    """The state of environment i alone, of a state whose arrays and lists have a row for each."""
+    """The state of environment i alone, of a state whose arrays and lists have a row for each, but for the settings."""
     if isinstance(state, dict):
-        return {name: row_of(value, i) for name, value in state.items()}
+        return {name: value if name == SETTINGS else row_of(value, i) for name, value in state.items()}
     return state[i : i + 1] if isinstance(state, (np.ndarray, list)) else state
 
 
@@ -157,7 +159,10 @@ def one_below_another(states: Sequence):
     """The state of several environments, of the states of each: `row_of`'s inverse."""
     first = states[0]
     if isinstance(first, dict):
-        return {name: one_below_another([state[name] for state in states]) for name in first}
+        return {
+            name: value if name == SETTINGS else one_below_another([state[name] for state in states])
+            for name, value in first.items()
+        }
     if isinstance(first, np.ndarray):
         return np.concatenate(states)
     return sum(states, []) if isinstance(first, list) else first

@@ -12,7 +12,9 @@ import gzip
 import hashlib
 import io
 import json
+import os
 import tokenize
+import zlib
 from importlib.resources import files
 from pathlib import Path
 
@@ -155,12 +157,15 @@ def known_or_measured(task: Task, seeds: list[int]) -> pd.DataFrame:
             print("the constant plans' returns that ship are of another physics than this")
     name = hashlib.sha256(repr((physics, seeds)).encode()).hexdigest()[:16]
     path = cache_folder().parent / FOLDER / f"{task.env_id}-{name}.csv.gz"
-    if path.exists():
+    with contextlib.suppress(OSError, EOFError, ValueError, zlib.error):  # not there, or damaged
         return read(path)[0]
     print("constant plans on these episodes, for the score: played once, then kept")
     table = measure(task, seeds)
     try:
-        write(path, table, physics)
+        # another process may measure the same meanwhile
+        apart = path.with_name(f"{os.getpid()}-{path.name}")
+        write(apart, table, physics)
+        os.replace(apart, path)
     except OSError as error:
         print(f"not kept: {path} ({error.strerror})")
     return table

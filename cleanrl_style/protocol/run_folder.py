@@ -161,7 +161,10 @@ class Run:
             self._write_config()
         # timing.csv keeps its rows; the time that this run took goes on from the last whole one
         *rows, half_a_row = self.lock.read().split(b"\n")
-        earlier = float(rows[-1].split(b",")[-1]) if len(rows) > 1 else 0.0
+        try:
+            earlier = float(rows[-1].split(b",")[-1]) if len(rows) > 1 else 0.0
+        except ValueError:
+            fail(f"{timing_file} is damaged; --overwrite starts over")
         self.start = time.perf_counter() - earlier
         self.tables = {"timing": Table(timing_file, TIMING_COLUMNS, sum(len(row) + 1 for row in rows))}
 
@@ -245,7 +248,7 @@ class Run:
             if not table.exists() or table.stat().st_size < size:
                 fail(f"{table} is shorter than when the checkpoint was written; --overwrite starts over")
         if checkpoint["envs"] is None:
-            print(f"{self.args.env_id} has no get_state(): the interrupted run starts over", flush=True)
+            print(f"{self.args.env_id} gives no state to go on from: the interrupted run starts over", flush=True)
             return
         self.checkpoint, self.checkpoint_step = checkpoint, checkpoint["global_step"]
 

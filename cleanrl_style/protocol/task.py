@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium.wrappers import OrderEnforcing
 
 import boreal_env
+from cleanrl_style.flags import fail
 from cleanrl_style.protocol.fronts import return_columns, weight_columns
 from cleanrl_style.protocol.utility import LINEAR, Utility
 from sim.task.preference import check_weights
@@ -127,8 +128,12 @@ class Task:
         return np.stack([as_mask(answer) for answer in envs.call("action_masks")])
 
     def sample_sites(self, site_seeds) -> np.ndarray:
-        """What is observed at `site_entries` of sites with these seeds, (n, entries)."""
-        return boreal_env.sample_site_observations(site_seeds)
+        """What is observed at `site_entries` of sites of ours with these seeds, (n, entries)."""
+        sites = boreal_env.sample_site_observations(site_seeds)
+        if sites.shape[1] != len(self.site_entries):
+            own = f"--env-id {self.env_id}: it observes {len(self.site_entries)} site parameters, ours {sites.shape[1]}"
+            fail(f"{own}, whose sites scores are centred by; --raw-selector does without")
+        return sites
 
     def make(self, **kwargs) -> gym.Env:
         """One environment."""

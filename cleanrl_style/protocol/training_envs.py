@@ -9,6 +9,7 @@ from functools import partial
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.wrappers import TimeLimit
 
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.hosts import Block, Streams, split
@@ -43,8 +44,10 @@ class InWorker(gym.Wrapper):
         return self._or_end(self.env.get_wrapper_attr("action_masks"))
 
     def get_state(self):
-        """The environment's own get_state(), None if it has none."""
-        return self._or_end(self.unwrapped.get_state) if hasattr(self.unwrapped, "get_state") else None
+        """The environment's own get_state(); None if it has none, or if a time limit counts beside it."""
+        if not hasattr(self.unwrapped, "get_state") or has_time_limit(self.env):
+            return None
+        return self._or_end(self.unwrapped.get_state)
 
     def set_states(self, states) -> None:
         """Continue from this worker's state among those of all."""
@@ -64,6 +67,11 @@ class InWorker(gym.Wrapper):
             return function(*args, **kwargs)
         except Exception:
             end_process(self.streams)
+
+
+def has_time_limit(env: gym.Env) -> bool:
+    """Whether one of an environment's wrappers ends its episodes."""
+    return isinstance(env, gym.Wrapper) and (isinstance(env, TimeLimit) or has_time_limit(env.env))
 
 
 def name_of(streams: range) -> str:

@@ -1,0 +1,93 @@
+"""What trainings score together: policies of several seeds of Group PPO, averaged, beside each for itself.
+
+    python analysis/studies/ensembles.py      # a quarter of an hour on two idle cores
+
+Seeds of one method differ, though they learn the same. Is that chance, of sites, dice and actions that a training
+happened to see? Then the mean of several policies is better than any of them: chance is averaged away, and what all
+have learnt stays. Here the mean of the logarithms of their probabilities chooses. Disjoint sets of the archived seeds
+play the evaluation's sites. Leaves results/studies/ensembles.csv, a row a task, set and site: the scalarised gain.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis import experiments, metrics, paths, stored
+from analysis.studies import open_loop
+from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts, reference
+
+SCRIPT = "ppo_group"
+TASKS = (experiments.GENERALIST, experiments.BALANCED)
+SEEDS = 10
+SIZES = (2, 5, 10)  # of a set; single seeds are the main table's
+LEAST = 1e-12  # a probability of 0 would be a veto of one for all
+
+
+@dataclass
+class Args:
+    """Measures what averaged policies gain."""
+
+    episodes: int = 200
+    """evaluation episodes per weight"""
+    quick: bool = False
+    """2 episodes, the sets of ten: to see that it runs, into results/quick/studies"""
+
+
+def sets_of(size: int) -> list[range]:
+    """Disjoint sets of training seeds, as many as there are."""
+    return [range(first, first + size) for first in range(1, SEEDS - size + 2, size)]
+
+
+def together(policies: list):
+    """The policy that a mean of policies is: action probabilities (n, 25)."""
+
+    def probabilities(observations, masks, accrued_returns):
+        logs = [np.log(np.maximum(one(observations, masks, accrued_returns), LEAST)) for one in policies]
+        mean = np.where(masks, np.exp(np.mean(logs, axis=0)), 0.0)
+        return mean / mean.sum(axis=1, keepdims=True)
+
+    return probabilities
+
+
+def gains_of(policies: list, task: protocol.Task, episodes: int) -> pd.Series:
+    """Scalarised gain of each site, mean over the weights, of policies together."""
+    weights = fronts.evaluation_weights(task.num_objectives)
+    evaluation, _ = protocol.evaluate(task, together(policies), weights, episodes, ("greedy",))
+    plans = reference.reference_returns(task, evaluation.seed.drop_duplicates().tolist())
+    nothing = plans[plans.plan == reference.NOTHING]
+    return metrics.of_sites(metrics.gains(evaluation, nothing))
+
+
+def path(quick: bool = False) -> Path:
+    """The table."""
+    return paths.studies(quick) / "ensembles.csv"
+
+
+def main(args: Args) -> None:
+    """Play every set on both tasks, and write the table."""
+    episodes, sizes = (2, SIZES[-1:]) if args.quick else (args.episodes, SIZES)
+    archive = paths.there(paths.archive())
+    made_by = {"episodes": episodes, "physics": open_loop.fingerprint()}
+    if stored.is_finished(path(args.quick), made_by):
+        print(f"{path(args.quick)} is finished")
+        return
+    tables = []
+    for task_id in TASKS:
+        folder = archive / SCRIPT / f"{task_id}-vectorization=lockstep"
+        policies = {seed: protocol.load_policy(folder / f"seed{seed}") for seed in range(1, SEEDS + 1)}
+        task = policies[1].task()
+        for size in sizes:
+            for seeds in sets_of(size):
+                print(f"{task_id}: seeds {seeds[0]} to {seeds[-1]}", flush=True)
+                gained = gains_of([policies[seed] for seed in seeds], task, episodes)
+                rows = {"task": task_id, "size": size, "first_seed": seeds[0], "seed": gained.index, "gain": gained}
+                tables.append(pd.DataFrame(rows))
+    stored.write(path(args.quick), pd.concat(tables, ignore_index=True), made_by)
+    print(f"wrote {path(args.quick)}")
+
+
+if __name__ == "__main__":
+    main(protocol.parse(Args))

@@ -1,0 +1,67 @@
+"""What each choice of Group PPO is worth: its runs with one thing changed less those without, paired by training seed.
+
+A difference of scores is over the same sites, and its 95 % interval over seeds and sites together. How far the
+preference is followed is the change of a return from weight 0 to 1: its difference has an interval over seeds.
+"""
+
+import numpy as np
+import pandas as pd
+
+from analysis import metrics
+from analysis.tables.common import over_seeds, row_of
+from analysis.tables.main_results import named
+from cleanrl_style import protocol
+
+TITLE = "Choices of Group PPO"
+SCRIPT = "ppo_group"
+EXPERIMENTS = ("group", "budgets")
+MADE_BY = "python analysis/reproduce.py --only main group budgets"
+CHANGES = ("carbon_change", "thaw_change")
+COLUMNS = {
+    "method": "method",
+    "environment": "environment",
+    "setting": "changed",
+    "seeds": "seeds",
+    "score_greedy": "score, greedy",
+    "score_sampled": "score, sampled",
+    "carbon_change": "carbon, weight 1 less 0",
+    "thaw_change": "thaw, weight 1 less 0",
+}
+
+
+def by_seed(replicates: list) -> dict[int, object]:
+    """Replicates by their training seed, those whose gains and plans are known."""
+    known = [one for one in replicates if one.gains is not None and one.plans is not None]
+    return {one.runs[0].arguments["seed"]: one for one in known}
+
+
+def score_difference(pairs: list[tuple], policy: str) -> tuple[float, float, float]:
+    """Score of the first of each pair less that of the second, with its interval over seeds and sites."""
+    sites = [
+        metrics.of_sites(one.by_policy[policy]) - metrics.of_sites(other.by_policy[policy]) for one, other in pairs
+    ]
+    plans = pairs[0][0].plans
+    weights = np.unique(metrics.weights_of(pairs[0][0].gains), axis=0)
+    return metrics.score_interval(pd.DataFrame(sites), metrics.plans_of_sites(plans, weights))
+
+
+def followed(one) -> np.ndarray:
+    """Change of both returns from weight 0 to 1."""
+    return metrics.preference_response(one.evaluation).change.to_numpy()
+
+
+def make(results) -> pd.DataFrame:
+    """One row per changed choice."""
+    default = by_seed(results.of("main", SCRIPT))
+    rows = []
+    for key in dict.fromkeys(job.row for job in results.jobs if job.script == SCRIPT and job.experiment in EXPERIMENTS):
+        changed = by_seed(results.rows[key])
+        pairs = [(changed[seed], default[seed]) for seed in sorted(changed.keys() & default.keys())]
+        row = row_of(key, len(pairs))
+        if pairs:
+            for policy in protocol.POLICIES:
+                row |= named(f"score_{policy}", *score_difference(pairs, policy))
+            changes = np.array([followed(one) - followed(other) for one, other in pairs])
+            row |= over_seeds(pd.DataFrame(changes, columns=list(CHANGES)))
+        rows.append(row)
+    return pd.DataFrame(rows)
