@@ -4,12 +4,13 @@ python analysis/document_environment.py [--path docs/environment.md]
 """
 
 import inspect
+import re
 import textwrap
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import boreal_env
-from boreal_env import BorealEnv, BorealVectorEnv, Objective, Observed, Reward
+from boreal_env import BALANCED_CARBON_SCALE, BorealEnv, BorealVectorEnv, Objective, Observed, Reward
 from cleanrl_style.flags import fail, parse
 from sim.task.observation import observation_rows
 
@@ -82,7 +83,11 @@ in its unit again.
 `boreal_env.Reward`; the paper's values. `boreal-balanced-v0` has `carbon_scale = {boreal_env.BALANCED_CARBON_SCALE:g}`
 and keeps it when `reward` is a dict of other constants.
 
-{table(("constant", "value"), ((f"`{name}`", f"{value:g}") for name, value in asdict(Reward()).items()))}
+{table(("constant", "value", "unit"), ((f"`{k}`", f"{value:g}", unit(k)) for k, value in asdict(Reward()).items()))}
+
+So a carbon return of 1 is {Reward().carbon_scale:g} kgC m-2 more in the stand and its products
+({BALANCED_CARBON_SCALE:g} in `boreal-balanced-v0`), and a thaw return of 1 is {Reward().thaw_scale:g} MJ m-2 that have gone
+up through the boundary.
 
 What the environment adds to the annual record:
 {columns}
@@ -111,6 +116,11 @@ def timber(year):
 env = gym.make("boreal-generalist-v0", objectives=("carbon", "thaw", boreal_env.Objective("timber", timber, 0.0, 1.0)))
 ```
 """
+
+
+def unit(constant: str) -> str:
+    """Unit of a constant of the reward, which stands behind it in its source."""
+    return re.search(rf"^    {constant}: float = \S+(?:  # (.*))?$", inspect.getsource(Reward), re.MULTILINE)[1] or "1"
 
 
 def observation_row(numbered: tuple[int, Observed]) -> tuple[str, ...]:

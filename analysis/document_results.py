@@ -21,6 +21,7 @@ from analysis.experiments import BALANCED, GENERALIST
 from analysis.figures import learning_asymmetry, learning_curves, learning_difficulty
 from analysis.paper_claims.claim import FEWEST_SEEDS
 from analysis.results import Results
+from analysis.studies import ensembles
 from analysis.tables import best_known, group_choices, main_results, runtime, single_sites
 from analysis.tables import learning_difficulty as difficulty_table
 from analysis.tables.common import has_numbers, over_seeds
@@ -240,6 +241,29 @@ def choices(results: Results) -> str:
     return excerpts.markdown(header, rows)
 
 
+def averaged(results: Results) -> str:
+    """Scores of policies of several trainings averaged, beside those of each for itself."""
+    table = results.study("ensembles")
+    if table is None:
+        return "Not run yet: `python analysis/studies/ensembles.py`.\n"
+    rows = {}
+    for task, of_task in table.groupby("task", sort=False):
+        alone = main_points.default_rows(results, task).get(ensembles.SCRIPT, [])
+        if not alone or alone[0].plans is None:
+            continue
+        sets = {1: pd.DataFrame([metrics.of_sites(one.by_policy["greedy"]) for one in alone])}
+        for size, of_size in of_task.groupby("size"):
+            sets[size] = of_size.pivot(index="first_seed", columns="seed", values="gain")
+        plans = metrics.plans_of_sites(alone[0].plans, np.unique(metrics.weights_of(alone[0].gains), axis=0))
+        for size, gained in sets.items():
+            # a single set varies between sites alone
+            score = metrics.score_interval(np.repeat(gained, 2, axis=0) if len(gained) == 1 else gained, plans)
+            cells = rows.setdefault(size, [str(size), str(len(gained))])
+            cells.append("{:.1f} [{:.1f}, {:.1f}]".format(*score))
+    titles = [f"`{task}`" for task in dict.fromkeys(table.task)]
+    return excerpts.markdown(["trainings together", "sets", *titles], list(rows.values()))
+
+
 def sites_alone(results: Results) -> str:
     """Gains of agents of one objective on each of the single sites, and of the best constant plan there."""
     columns, table = single_sites.COLUMNS, single_sites.make(results)
@@ -268,6 +292,14 @@ def other_libraries(results: Results) -> str:
         cells += ["" if np.isnan(x) else f"{x:.{digits}f}" for x, digits in zip(shown, (0, 0, 2, 1, 1), strict=True)]
         cells += [f"{cost.steps:,.0f}", f"{cost.own_evaluation_steps:,.0f}"]
         text += "| " + " | ".join(cells) + " |\n"
+    there = {(script, env_id) for (script, env_id, _), _ in rows}
+    lacking = [
+        f"{methods.title(script)} on `{env_id}`"
+        for env_id in (GENERALIST, BALANCED)
+        for script in methods.OUTSIDE
+        if (script, env_id) not in there
+    ]
+    text += f"\nNot run yet: {', '.join(lacking)}.\n" if lacking else ""
     return text if rows else not_run("outside")
 
 
@@ -377,6 +409,7 @@ TABLES = {
     "generalisation": on_other_sites,
     "difficulty": difficulty,
     "group_choices": choices,
+    "ensembles": averaged,
     **{f"figure_{name}": figure_of(name) for name in FIGURES},
 }
 EXCERPTS = {

@@ -93,6 +93,9 @@ def paragraph(results, env_id: str) -> str:
         f"by the whole interval of the difference on the same sites {named(above)} above planting, {named(beat)} above "
         "100."
     )
+    few = [script for script in trained if len(rows[script]) < FEWEST_SEEDS]
+    if few:
+        text += f" Few training seeds: {listed([f'{methods.title(script)} {len(rows[script])}' for script in few])}."
     lacking = [methods.title(script) for script in methods.LEARNERS if script not in known]
     text += f" Not run yet: {listed(lacking)}." if lacking else ""
     followed = {

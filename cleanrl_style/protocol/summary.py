@@ -60,7 +60,7 @@ def print_score(objectives, comparison: Comparison) -> None:
     episodes = comparison.evaluation.seed.nunique()
     scores = {name: f"{comparison.score(name):z.0f}" for name in shown}
     policies = ", ".join(f"{scores[policy]} {policy}" for policy in sorted(POLICIES, key=lambda name: name != PRIMARY))
-    print(f"\nSCORE {policies}: 0 is to do nothing, 100 the best that one can do without looking")
+    print(f"\nSCORE {policies}: 0 is to do nothing, 100 the best plan that does the same every year")
     what = "reward" if comparison.utility.ideal is None else "Chebyshev's utility"
     print(f"\nGain: {what} of an episode above that of doing nothing, mean of {episodes} evaluation episodes")
     whose = objectives[0] if len(objectives) == 2 else ""
