@@ -86,7 +86,7 @@ and keeps it when `reward` is a dict of other constants.
 {table(("constant", "value", "unit"), ((f"`{k}`", f"{value:g}", unit(k)) for k, value in asdict(Reward()).items()))}
 
 So a carbon return of 1 is {Reward().carbon_scale:g} kgC m-2 more in the stand and its products
-({BALANCED_CARBON_SCALE:g} in `boreal-balanced-v0`), and a thaw return of 1 is {Reward().thaw_scale:g} MJ m-2 that have gone
+({BALANCED_CARBON_SCALE:g} in `boreal-balanced-v0`), and a thaw return of 1 is {Reward().thaw_scale:g} MJ m-2 that went
 up through the boundary.
 
 What the environment adds to the annual record:

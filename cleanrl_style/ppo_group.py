@@ -39,7 +39,7 @@ class Args:
     learning_rate: float = 1e-3
     """learning rate of Adam at the start; it falls linearly to 0"""
     rollout_steps: int = 3200
-    """steps of a rollout, summed over all environments: an episode of each, of 64 and 50 years"""
+    """steps of a rollout, summed over all environments: one episode of 50 years of each of 64"""
     gamma: float = 1.0
     """discount factor"""
     gae_lambda: tuple[float, ...] | None = None

@@ -42,6 +42,9 @@ SOURCES = {
     "share of conifers killed": "CBM-CFS3, spruce beetle: 2, 10 or 20 % by severity; budworm 45 % over 12 years",
     "mortality": "FVS-Alaska: spruce 0.3-0.5, birch 0.7-4.4, aspen 0.9-8.7; CLM6 1.7-2.4; LPJmL 1.5",
 }
+#: What is a draw or a parameter of the simulator and so cannot miss by itself, and what was calibrated to its band.
+INPUT = ("share of stems killed", "outbreaks", "share of conifers killed")
+CALIBRATED = ("fire return",)
 LIKELY = {
     "fire return": "the level of flammability; most warm days are dry enough",
     "share of stems killed": "draw of the share",
@@ -101,8 +104,9 @@ def report(sites: int) -> Part:
         [number(float(count[half].mean()) / YEARS, 0) for half in (dry, ~dry)] for count in (warm, ready)
     )
     text = f"""Stands held as in part 1, with fire and insects, {sites} sites for {YEARS} years: {years} stand-years of
-each kind, the last as an episode of the environment starts. Intervals are 95 % (Poisson). Dry and wet sites are the
-halves by annual precipitation.
+each kind, the last as an episode of the environment starts. Intervals are 95 % (Poisson). *Input* is what the simulator
+draws or is given, from the very sources of the band; flammability was calibrated to the return of fire. Dry and wet
+sites are the halves by annual precipitation.
 
 {document.table(["fire", "stand", "value", "literature", "verdict", "source"], fire_rows, left=6)}
 
@@ -210,4 +214,7 @@ def _row(
     if verdict != IN:
         misses.append(Miss(kind, f"{name}: {number(value, digits)}, literature {limits}", LIKELY[source]))
     text = number(value, digits) + spread
-    return [name, kind, text, limits, verdict if verdict == IN else f"**{verdict}**", SOURCES[source]]
+    shown = verdict if verdict == IN else f"**{verdict}**"
+    if verdict == IN and source in (*INPUT, *CALIBRATED):
+        shown = "input" if source in INPUT else "in, calibrated"
+    return [name, kind, text, limits, shown, SOURCES[source]]

@@ -7,10 +7,12 @@ from sim.simulate import HELD_STAND
 
 @dataclass(frozen=True)
 class TowerStand:
-    """What grows at a tower: overrides of site parameters and constants, and the stocks to start from."""
+    """What grows at a tower: overrides of site parameters and constants, the stocks to start from, and the leaf area of
+    its trees per ground (within crowns it is what site and crowns make of it)."""
 
     site: dict[str, float]
     initial: dict[str, float]
+    lai: float
     constants: dict[str, float] = field(default_factory=dict)
 
 
@@ -23,11 +25,11 @@ SE_SVB = TowerStand(
         "mean_annual_temperature_c": 2.5,
         "seasonal_amplitude_c": 11.3,
         "deep_boundary_temperature_k": 277.4,
-        # Needles of the mean stem of each species, 17-21 cm thick and 17 m tall (Marklund 1988), with the specific
-        # leaf areas of Harkonen et al. (2015), give the conifers a leaf area of 5.
-        "max_lai_conifer": 5.0,
         **HELD_STAND,
     },
+    # Needles of the mean stem of each species, 17-21 cm thick and 17 m tall (Marklund 1988), with the specific leaf
+    # areas of Harkonen et al. (2015), give the conifers 5; the birches add about 0.4.
+    lai=5.4,
     initial={
         "conifer_mature_stems_ha": 950.0,
         "deciduous_mature_stems_ha": 112.0,
@@ -38,17 +40,15 @@ SE_SVB = TowerStand(
     },
 )
 
-#: Leaf area of the trees per ground: leaf area and height of the 16 felled trees (log-log regression, corrected for
-#: its bias) over the 350 spruces of the 0.09 ha census of 2010; crowns of 0.44 m radius (20 trees) cover 0.21.
-_SPRUCE_LAI, _SPRUCE_COVER = 0.475, 0.208
-
 US_PRR = TowerStand(
+    # Leaf area and height of the 16 felled trees (log-log regression, corrected for its bias) over the 350 spruces of
+    # the 0.09 ha census of 2010. Crowns of 0.44 m radius (20 trees) cover 0.21 of the ground, 0.17 with their overlap.
+    lai=0.475,
     site={
         "latitude_deg": 65.124,
         "mean_annual_temperature_c": -2.7,  # of 2011-14
         "seasonal_amplitude_c": 19.6,  # first harmonic of ERA-Interim 1989-2014
         "deep_boundary_temperature_k": 272.15,  # permafrost at about -1 degC
-        "max_lai_conifer": _SPRUCE_LAI / _SPRUCE_COVER,
         "canopy_roughness_m": 0.37,  # Chu et al. 2021, as used by Ikawa et al. 2024
         **HELD_STAND,
     },
@@ -72,5 +72,5 @@ US_PRR = TowerStand(
 
 #: The same without the understorey.
 US_PRR_TREES_ALONE = TowerStand(
-    site=US_PRR.site, constants={**US_PRR.constants, "understorey_lai": 0.0}, initial=US_PRR.initial
+    site=US_PRR.site, constants={**US_PRR.constants, "understorey_lai": 0.0}, initial=US_PRR.initial, lai=US_PRR.lai
 )
