@@ -27,6 +27,12 @@ def test_a_time_limit_has_no_state_to_go_on_from():
     assert states[0] is None and states[1] is not None
 
 
+def test_returns_that_are_not_finite_are_no_row():
+    task = protocol.Task("sites-v0", {}, ("carbon", "thaw"))
+    with pytest.raises(FloatingPointError, match="sites-v0: an episode's returns are .*nan"):
+        task.returns_row(np.array([0.5, 0.5]), np.array([1.0, np.nan]))
+
+
 def test_sites_of_another_kind_are_not_centred_by_ours():
     task = protocol.Task("sites-v0", {}, ("carbon", "thaw"), site_entries=(43, 44, 45))
     with pytest.raises(SystemExit, match="it observes 3 site parameters, ours 62.*--raw-selector"):

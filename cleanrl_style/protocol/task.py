@@ -104,7 +104,12 @@ class Task:
         return dict(zip(weight_columns(self.objectives), weights, strict=self.num_objectives != 2))
 
     def returns_row(self, weights: np.ndarray, returns: np.ndarray) -> dict:
-        """A table's columns of weights (m,), returns (m,) and scalarised return, which is their utility."""
+        """A table's columns of weights (m,), returns (m,) and scalarised return, which is their utility.
+
+        FloatingPointError for returns that are not finite, as an environment's rewards may make them.
+        """
+        if not np.isfinite(returns).all():
+            raise FloatingPointError(f"{self.env_id}: an episode's returns are {returns}: a reward was not finite")
         columns = dict(zip(return_columns(self.objectives), returns, strict=True))
         return {**self.weights_row(weights), **columns, "scalarized_return": self.utility(returns, weights)}
 
