@@ -89,8 +89,10 @@ class Results:
         self.missing = [job for job in jobs if not job.is_study and not any(job.made(run.config) for run in self.runs)]
 
     @staticmethod
-    def load(quick: bool, roots: tuple[Path, ...] | None = None) -> "Results":
+    def load(quick: bool, roots: tuple[Path, ...] | None = None, here: bool = False) -> "Results":
         """The results of `reproduce.py`, or of `reproduce.py --quick`.
+
+        here : only those below the folder in which the command is started, as for a study that writes there.
 
         The archive comes before the runs themselves, so that a clone's tables have the same digits. Exits with one line
         if a folder of `roots` is not there.
@@ -99,7 +101,9 @@ class Results:
             if not root.is_dir():
                 protocol.fail(f"--runs-dir {root}: no such folder")
         jobs = experiments.quick_jobs() if quick else experiments.jobs()
-        archive, studies = paths.there(paths.archive(quick)), paths.there(paths.studies(quick))
+        archive, studies = paths.archive(quick), paths.studies(quick)
+        if not here:
+            archive, studies = paths.there(archive), paths.there(studies)
         return Results(roots or (archive, paths.runs(quick)), jobs, studies)
 
     @cached_property

@@ -325,6 +325,14 @@ def test_the_same_run_in_two_folders_counts_once(tmp_path, capsys):
     assert "left out" not in capsys.readouterr().err
 
 
+def test_elsewhere_the_repositorys_results_are_read(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert paths.there(paths.archive()) == ROOT / "results" / "runs"
+    assert paths.there(paths.archive(quick=True)) == paths.archive(quick=True)
+    paths.archive().mkdir(parents=True)
+    assert paths.there(paths.archive()) == paths.archive()
+
+
 def test_of_two_that_differ_the_run_of_this_physics_counts(tmp_path, capsys):
     """An older archive does not hide a run that was made anew."""
     for name, carbon in (("archive", (0, 1, 2)), ("runs", (3, 4, 5))):

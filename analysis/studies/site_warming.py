@@ -66,7 +66,7 @@ def study(curricula: list[results.Replicate], each: int, years: int) -> pd.DataF
 
 def main(args: Args) -> None:
     """Play the drawn sites, unless the table is there."""
-    found = results.Results.load(args.quick)
+    found = results.Results.load(args.quick, here=True)
     curricula = found.of("main", "ppo_curriculum")
     if not curricula:
         command = found.first_job("main", "ppo_curriculum").command
