@@ -136,7 +136,8 @@ up for each other; for temperature, {QUANTITIES["soil temperature"].tolerance:g}
 {QUANTITIES["soil temperature"].largest_rmse:g} degC; for albedo, {QUANTITIES["albedo"].tolerance:g} of bias; for the
 day that snow is gone, {tower_comparison.DAYS_OF_SNOW_OFF:g} days; for a depth of snow,
 {percent(SNOW_DEPTH_TOLERANCE)}. Only days count on which at least {percent(tower_comparison.MEASURED_SHARE)} of the
-quantity was measured, and months of at least {tower_comparison.FEWEST_DAYS} such days; n is the number of months or days. The worst month has the largest gap."""
+quantity was measured, and months of at least {tower_comparison.FEWEST_DAYS} such days; n is the
+number of months or days. The worst month has the largest gap."""
 
 
 def _misses(comparison: Comparison) -> list[Miss]:
