@@ -74,6 +74,7 @@ FLAGS = {
     "pcn": ("--num-er-episodes", 2, "--num-step-episodes", 2),
     "morld": ("--learning-starts", 100, "--exchange-every", 50, "--pop-size", 2, "--own-episodes", 1),
     "gpi_ls": ("--timesteps-per-iter", 100, "--own-episodes", 1),
+    "maskable_ppo": ("--num-envs", 2),
 }
 
 

@@ -1,6 +1,6 @@
 """What the commands share: the environment as a library trains on it, and the run folder that comes of it.
 
-A library has its own loop and its own preferences. It gets one environment without the preference that ours observes,
+A library has its own loop and its own preferences. It gets an environment without the preference that ours observes,
 in which it can take valid actions alone: random ones are drawn from them, and a network that has no mask is given one
 (`masked`), so that all methods choose among the same actions. What it has learnt is evaluated as ours is.
 """
@@ -50,7 +50,7 @@ class Args:
     overwrite: bool = False
     """start over in a folder that already holds a run"""
 
-    num_envs: ClassVar[int] = 1  # the libraries step one
+    num_envs: ClassVar[int] = 1  # morl-baselines steps one
     trial: ClassVar = (2000, "half an hour to five hours")  # what `--help` says
     left: ClassVar = """A stopped run starts over.
 The folder gets config.json, episodes.csv, cost.csv, evaluation.csv and summary.png, which docs/outside.md explains"""
@@ -165,7 +165,7 @@ class Session:
     run: protocol.Run
 
     def __post_init__(self):
-        self.envs: list[Env] = []
+        self.envs: list = []  # each counts its steps, episodes and seconds
         self.own: list[Env] = []  # of a library's own evaluations
         self.progress = protocol.Progress("training", self.args.total_timesteps, "steps", 0, self.task.objectives)
 
@@ -178,16 +178,20 @@ class Session:
         weights = np.full(m, 1 / m) if weights is None else weights
 
         def finished(env, info):
-            step = sum(one.steps for one in self.envs)
-            row = {"global_step": step, "episode": sum(one.episodes for one in self.envs), "env": self.envs.index(env)}
-            row |= self.task.returns_row(weights, env.returns)
-            row |= {name: info[name] for name in ("site_seed", *protocol.EPISODE_INFO)}
-            self.run.log("episodes", row)
-            self.progress.returns.append(env.returns)
-            self.progress.show(step)
+            self.finished(self.envs.index(env), weights, env.returns, info)
 
         self.envs.append(Env(self.task, [self.args.seed * protocol.MAX_ENVS + len(self.envs)], finished))
         return self.envs[-1]
+
+    def finished(self, number: int, weights: np.ndarray, returns: np.ndarray, info: dict) -> None:
+        """Log an episode of the stand of that number, and show how far the training is."""
+        step = sum(one.steps for one in self.envs)
+        row = {"global_step": step, "episode": sum(one.episodes for one in self.envs), "env": number}
+        row |= self.task.returns_row(weights, returns)
+        row |= {name: info[name] for name in ("site_seed", *protocol.EPISODE_INFO)}
+        self.run.log("episodes", row)
+        self.progress.returns.append(returns)
+        self.progress.show(step)
 
     def own_evaluation(self, episodes: int) -> Env:
         """An environment for a library's own evaluations: the same episodes, none of the published ones, in turn."""
@@ -213,7 +217,8 @@ def main(script: str, arguments: type, learn: Callable, samples: bool) -> None:
         np.random.seed(args.seed)  # noqa: NPY002, the libraries draw from it
         torch.manual_seed(args.seed)
         torch.set_num_threads(1)
-        protocol.compile_physics([1])
+        if args.num_envs == 1:
+            protocol.compile_physics([1])
         session, start = Session(args, task, run), time.perf_counter()
         learnt = learn(session)
         seconds = time.perf_counter() - start

@@ -2,7 +2,7 @@
 
     python analysis/outside/maskable_ppo.py --seed 1 --env-id boreal-balanced-v0
 
-Settings are the library's own.
+Settings are the library's own, but for the stands: 16 in lockstep, which the library steps as its VecEnv.
 """
 
 from dataclasses import dataclass
@@ -11,13 +11,17 @@ from cleanrl_style.flags import require
 
 require("sb3_contrib", extra="outside")
 
+import time
+
 import gymnasium as gym
 import numpy as np
 import torch
 from sb3_contrib import MaskablePPO
+from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from analysis.outside.common import Args, Session, main
 from cleanrl_style import protocol
+from cleanrl_style.protocol import training_envs
 
 
 @dataclass
@@ -26,8 +30,10 @@ class MaskablePPOArgs(Args):
 
     learning_rate: float = 3e-4
     """of Adam"""
+    num_envs: int = 16
+    """stands in lockstep"""
     n_steps: int = 2048
-    """steps of a rollout"""
+    """steps of a rollout, summed over all stands"""
     batch_size: int = 64
     """steps of a minibatch"""
     n_epochs: int = 10
@@ -40,37 +46,64 @@ class MaskablePPOArgs(Args):
     """weight of the entropy bonus"""
 
 
-class Scalarised(gym.Wrapper):
-    """The environment with the weighed sum of its rewards."""
+class Stands(VecEnvWrapper):
+    """Stands in lockstep, seeded by the run whatever the library asks for, without the preference in what they observe.
 
-    def __init__(self, env: gym.Env, weights: np.ndarray):
-        super().__init__(env)
-        self.weights = weights
+    number : of the agent that trains on them, at these weights.
+    """
 
-    def step(self, action):
-        """A year."""
-        observation, reward, *rest = self.env.step(action)
-        return observation, float(reward @ self.weights), *rest
+    def __init__(self, session: Session, number: int, weights: np.ndarray):
+        args, task = session.args, session.task.with_preference(weights)
+        envs = training_envs.make_training_envs(task, args.num_envs, "lockstep").stable_baselines3()
+        self.first, self.hidden = number * args.num_envs, task.num_objectives - 1
+        envs.seed(args.seed * protocol.MAX_ENVS + self.first)
+        space = envs.observation_space
+        space = gym.spaces.Box(space.low[self.hidden :], space.high[self.hidden :], dtype=space.dtype)
+        super().__init__(envs, observation_space=space)
+        self.session, self.weights, self.objectives = session, weights, task.objectives
+        self.steps, self.episodes, self.seconds = 0, 0, 0.0
+        session.envs.append(self)
 
-    def action_masks(self) -> np.ndarray:
-        """Valid actions, bool (25,)."""
-        return self.env.action_masks()
+    def seed(self, seed=None):
+        """The library's seed is for its own draws."""
+        return [None] * self.num_envs
+
+    def reset(self) -> np.ndarray:
+        """The first episodes."""
+        start = time.perf_counter()
+        observations = self.venv.reset()
+        self.seconds += time.perf_counter() - start
+        return observations[:, self.hidden :]
+
+    def step_wait(self):
+        """A year of every stand, and the next episode of those that ended."""
+        start = time.perf_counter()
+        observations, rewards, ended, infos = self.venv.step_wait()
+        self.seconds += time.perf_counter() - start
+        self.steps += self.num_envs
+        for i in np.flatnonzero(ended):
+            self.episodes += 1
+            infos[i]["terminal_observation"] = infos[i]["terminal_observation"][self.hidden :]
+            returns = np.array([infos[i][f"{name}_return"] for name in self.objectives])
+            self.session.finished(self.first + i, self.weights, returns, infos[i])
+        return observations[:, self.hidden :], rewards, ended, infos
 
 
 def learn(session: Session):
     """Train an agent for each weight of the evaluation, one after the other."""
     args, task, agents = session.args, session.task, {}
     share = args.total_timesteps // len(args.eval_weights)
-    if share < 2:
-        protocol.fail(f"--total-timesteps {args.total_timesteps}: two or more for each of the weights are allowed")
-    n_steps = min(args.n_steps, share)
+    n_steps = min(args.n_steps, share) // args.num_envs * args.num_envs  # whole years of all stands
+    if n_steps < max(2, args.num_envs):
+        least = max(2, args.num_envs) * len(args.eval_weights)
+        protocol.fail(f"--total-timesteps {args.total_timesteps}: at least {least}, a year of every stand for each weight")
     for number, given in enumerate(args.eval_weights):
         weights = task.check_weights(given)
         agent = MaskablePPO(
             "MlpPolicy",
-            Scalarised(session.env(weights), weights),
+            Stands(session, number, weights),
             learning_rate=args.learning_rate,
-            n_steps=n_steps,
+            n_steps=n_steps // args.num_envs,
             batch_size=min(args.batch_size, n_steps),
             n_epochs=args.n_epochs,
             gamma=args.gamma,
