@@ -94,9 +94,10 @@ def learn(session: Session):
     args, task, agents = session.args, session.task, {}
     share = args.total_timesteps // len(args.eval_weights)
     n_steps = min(args.n_steps, share) // args.num_envs * args.num_envs  # whole years of all stands
-    if n_steps < max(2, args.num_envs):
-        least = max(2, args.num_envs) * len(args.eval_weights)
-        protocol.fail(f"--total-timesteps {args.total_timesteps}: at least {least}, a year of every stand for each weight")
+    least = max(2, args.num_envs)
+    if n_steps < least:
+        allowed = f"at least {least * len(args.eval_weights)}, a year of every stand for each weight"
+        protocol.fail(f"--total-timesteps {args.total_timesteps}: {allowed}")
     for number, given in enumerate(args.eval_weights):
         weights = task.check_weights(given)
         agent = MaskablePPO(
