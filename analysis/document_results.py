@@ -228,7 +228,7 @@ def choices(results: Results) -> str:
     """Group PPO with one choice changed less the default, bold where the interval of five seeds and more lacks 0."""
     table = group_choices.make(results)
     if not has_numbers(table, group_choices.COLUMNS):
-        return not_run("main", "group", "budgets")
+        return not_run("main", "balanced", "group", "budgets")
     decimals = {"score_greedy": 1, "score_sampled": 1} | dict.fromkeys(group_choices.CHANGES, 2)
     rows = []
     for row in table[table.seeds > 0].to_dict("records"):
@@ -236,8 +236,8 @@ def choices(results: Results) -> str:
         for k, name in enumerate(decimals):
             told = row[f"{name}_low"] > 0.0 or row[f"{name}_high"] < 0.0
             cells[k] = f"**{cells[k]}**" if told and row["seeds"] >= FEWEST_SEEDS else cells[k]
-        rows.append([flags(row["setting"]), str(row["seeds"]), *cells])
-    header = [group_choices.COLUMNS[name] for name in ("setting", "seeds", *decimals)]
+        rows.append([flags(row["setting"]), f"`{row['environment']}`", str(row["seeds"]), *cells])
+    header = [group_choices.COLUMNS[name] for name in ("setting", "environment", "seeds", *decimals)]
     return excerpts.markdown(header, rows)
 
 

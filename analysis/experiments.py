@@ -155,6 +155,7 @@ def group(seeds) -> list[Job]:
         {"ent_coef": 0.0},
         {"gae_lambda": (0.95,)},
         {"reward_scales": REWARD_SCALES},
+        {"relabelings": 0, "env_id": BALANCED},
     )
     return [trained("group", "ppo_group", seed, **change) for seed in seeds_of(5, seeds) for change in changes]
 

@@ -15,7 +15,7 @@ from cleanrl_style.ppo_gated import Args
 COUNTS = {
     "main": 1 + len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
     "balanced": len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
-    "group": 40,
+    "group": 45,
     "outside": 10 * len(methods.OUTSIDE),
     "planners": 20,
     "worlds": 15,

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
+from analysis.experiments import BALANCED, GENERALIST
 from analysis.tables.common import over_seeds, row_of
 from analysis.tables.main_results import named
 from cleanrl_style import protocol
@@ -15,7 +16,7 @@ from cleanrl_style import protocol
 TITLE = "Choices of Group PPO"
 SCRIPT = "ppo_group"
 EXPERIMENTS = ("group", "budgets")
-MADE_BY = "python analysis/reproduce.py --only main group budgets"
+MADE_BY = "python analysis/reproduce.py --only main balanced group budgets"
 CHANGES = ("carbon_change", "thaw_change")
 COLUMNS = {
     "method": "method",
@@ -52,10 +53,10 @@ def followed(one) -> np.ndarray:
 
 def make(results) -> pd.DataFrame:
     """One row per changed choice."""
-    default = by_seed(results.of("main", SCRIPT))
+    defaults = {GENERALIST: by_seed(results.of("main", SCRIPT)), BALANCED: by_seed(results.of("balanced", SCRIPT))}
     rows = []
     for key in dict.fromkeys(job.row for job in results.jobs if job.script == SCRIPT and job.experiment in EXPERIMENTS):
-        changed = by_seed(results.rows[key])
+        changed, default = by_seed(results.rows[key]), defaults[key[1]]
         pairs = [(changed[seed], default[seed]) for seed in sorted(changed.keys() & default.keys())]
         row = row_of(key, len(pairs))
         if pairs:
