@@ -33,23 +33,24 @@ class Method:
         return f"{FOLDERS.get(self.kind, 'cleanrl_style')}/{self.script}.py"
 
 
-# Colours of Okabe and Ito (2008): told apart with every kind of colour vision; the markers tell them apart in grey.
+# Colours of Okabe and Ito (2008), then of Tol (2021): told apart with every kind of colour vision; markers tell them
+# apart in grey. No yellow: it is hardly seen on white.
 ROWS = (
     Method("zero_change", "Zero change", HEURISTIC, "#000000", "x", "zero_density_change"),
     Method("plus_100", "+100 a year", HEURISTIC, "#56B4E9", "+", "plus_100_density"),
     Method("target_density", "Target density 1000", HEURISTIC, "#E69F00", "v", "target_density"),
-    Method("conifer_restoration", "Conifer restoration", HEURISTIC, "#0072B2", "*", "conifer_restoration"),
+    Method("conifer_restoration", "Conifer restoration", HEURISTIC, "#999933", "*", "conifer_restoration"),
     Method("random_valid", "Random", CONTROL, "#999999", "1"),
     Method("eupg_var_lambda", "Variable λ EUPG", CONDITIONED, "#CC79A7", "s", "eupg_variable_lambda"),
     Method("ppo_gated", "PPO Gated", CONDITIONED, "#009E73", "^", "ppo_gated"),
     Method("ppo_curriculum", "Curriculum PPO", CONDITIONED, "#D55E00", "o", "curriculum_ppo"),
-    Method("ppo_group", "Group PPO", CONDITIONED, "#F0E442", "P"),
-    Method("eupg_fixed_lambda", "Fixed λ EUPG", FIXED_WEIGHT, "#0072B2", "D", "fixed_weight_eupg"),
+    Method("ppo_group", "Group PPO", CONDITIONED, "#0072B2", "P"),
+    Method("eupg_fixed_lambda", "Fixed λ EUPG", FIXED_WEIGHT, "#882255", "D", "fixed_weight_eupg"),
     Method("pcn", "PCN", OTHERS, "#E69F00", "p"),
     Method("gpi_ls", "GPI-LS", OTHERS, "#56B4E9", "h"),
     Method("envelope", "Envelope", OTHERS, "#CC79A7", "8"),
     Method("morld", "MORL/D", OTHERS, "#D55E00", "X"),
-    Method("maskable_ppo", "MaskablePPO", OTHERS, "#0072B2", "d"),
+    Method("maskable_ppo", "MaskablePPO", OTHERS, "#332288", "d"),
     Method("moea", "NSGA-II", POPULATION, "#56B4E9", "H"),
 )
 METHODS = {method.script: method for method in ROWS}

@@ -145,7 +145,7 @@ def read_forcing(
     pressure = choice.columns.get("air_pressure")
     if pressure:
         report.append(
-            f"air pressure is {record['air_pressure'].mean():.0f} hPa ({pressure.name}), which the simulator takes as "
+            f"air pressure is {record['air_pressure'].mean():.0f} hPa ({pressure.name}), which is not used: give it as "
             "constants={'air_pressure_hpa': ..}"
         )
     forcing.attrs = {"report": _sources(forcing, choice) + report, "site": site, "flags": dict(FLAGS)}

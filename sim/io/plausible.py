@@ -52,7 +52,7 @@ def _check_units(name, weather, columns, latitude_deg, interval) -> None:
 
     def refuse(column, what, possible=True):
         if not (possible and column.unit_given):
-            again = f"; {column.unit} again goes on" if possible else ""
+            again = f"; {column.unit} again takes it as it is" if possible else ""
             raise ValueError(
                 f"{name}: {column.name} in {column.unit}: {what}; say its unit: units={{{column.name!r}: ..}}, of "
                 f"{column.units}{again}"
