@@ -1,6 +1,7 @@
 """A trained policy, loaded again from its run's folder, plays as it did in the run's own evaluation."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ from scripts import ROOT, run_script
 
 from cleanrl_style import protocol
 from cleanrl_style.flags import policy_file
+from cleanrl_style.ppo_group import Agent
 
 TOY = "toy_env:toy-v0"
 SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
@@ -112,3 +114,12 @@ def test_a_file_that_no_script_has_written_is_named(damage, tmp_path):
     torch.save({**saved, **damage}, tmp_path / "policy.pt")
     with pytest.raises(ValueError, match="policy.pt: no policy that a script of this project has written"):
         protocol.load_policy(tmp_path / "policy.pt")
+
+
+def test_a_policy_is_not_saved_without_the_arguments_that_make_it():
+    envs = SimpleNamespace(single_observation_space=SimpleNamespace(shape=(5,)))
+    run = SimpleNamespace(envs=envs, config={"arguments": {}})
+    with pytest.raises(
+        TypeError, match=r"wants every argument that the Agent was made with after envs, not \{'num_log"
+    ):
+        protocol.Run.save_policy(run, Agent(envs, num_values=3, num_logits=3), num_logits=3)

@@ -7,6 +7,8 @@ import pandas as pd
 import pytest
 from scripts import ROOT, run_script
 
+from cleanrl_style.protocol.run_folder import folder_name
+
 PAGE = (ROOT / "docs" / "new_method.md").read_text(encoding="utf-8")
 
 
@@ -24,6 +26,8 @@ def test_the_followed_example(tmp_path):
         script = script.replace(old, new)
         changed += sum(line[0] in "-+" for line in hunk.split("\n"))
     assert f"says {changed}:" in PAGE
+    folder = folder_name("boreal-balanced-v0", {"vectorization": "lockstep"})
+    assert f"run=runs/ppo_neighbours/{folder}/seed1\n" in PAGE
     path = tmp_path / "ppo_neighbours.py"
     path.write_text(script, encoding="utf-8")
     run_script(

@@ -118,7 +118,7 @@ def load_policy(run_or_name, script=None) -> Policy:
         agent.load_state_dict({**critic, **saved["agent"]})
     except (RuntimeError, TypeError) as error:
         trained_it = f"another version of {run['script']}.py than {module.__file__} trained it"
-        raise ValueError(f"{path}: {trained_it}, of another network") from error
+        raise ValueError(f"{path}: {trained_it}, of another network or with other arguments of Agent") from error
     if not all(weights.isfinite().all() for weights in agent.state_dict().values()):
         raise ValueError(f"{path}: a weight of its network is not finite, so its training went wrong")
     probabilities, (size,) = module.make_policy(agent), space.shape

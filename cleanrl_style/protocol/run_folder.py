@@ -339,11 +339,20 @@ class Run:
             )
 
     def save_policy(self, agent, **arguments) -> None:
-        """Write policy.pt, what `load_policy` makes the policy of: no code in it. arguments : the Agent's own."""
+        """Write policy.pt, what `load_policy` makes the policy of: no code in it.
+
+        arguments : all of the Agent's after `envs`. Raises TypeError where they do not make an Agent of its weights.
+        """
         import torch
 
         buffer = io.BytesIO()
         shape = self.envs.single_observation_space.shape
+        try:
+            with torch.random.fork_rng(devices=[]):
+                type(agent)(self.envs, **arguments).load_state_dict(agent.state_dict())
+        except (RuntimeError, TypeError) as error:
+            own = "run.save_policy(agent, name=value, ..) wants every argument that the Agent was made with after envs"
+            raise TypeError(f"{own}, not {arguments}: they make another network") from error
         own = {name: value for name, value in self.config["arguments"].items() if name != "vectorization"}
         run = json.loads(json.dumps({"script": self.script, "arguments": own}))  # the same bytes, async or lockstep
         policy = {"agent": agent.state_dict(), "arguments": arguments, "observation_shape": shape, "run": run}
