@@ -119,7 +119,6 @@ def test_a_file_that_no_script_has_written_is_named(damage, tmp_path):
 def test_a_policy_is_not_saved_without_the_arguments_that_make_it():
     envs = SimpleNamespace(single_observation_space=SimpleNamespace(shape=(5,)))
     run = SimpleNamespace(envs=envs, config={"arguments": {}})
-    with pytest.raises(
-        TypeError, match=r"wants every argument that the Agent was made with after envs, not \{'num_log"
-    ):
+    lacking = r"wants every argument that the Agent was made with after envs, not \{'num_logits': 3\}: "
+    with pytest.raises(TypeError, match=lacking):
         protocol.Run.save_policy(run, Agent(envs, num_values=3, num_logits=3), num_logits=3)
