@@ -360,7 +360,7 @@ if __name__ == "__main__":
                 ended = next_done.reshape(num_groups, args.group_size)
                 if (ended != ended[:, :1]).any():
                     protocol.fail(f"--env-id {args.env_id}: the episodes of a group must be of one length")
-                # a preference is kept to the end of its episode
+                # ALGO LOGIC: a preference is kept to the end of its episode, then each group draws others
                 next_obs[:, : num_values - 1] = preferences[:, :-1]
                 drawn = spread_preferences(ended[:, 0].sum(), args.group_size, num_values)
                 next_obs[next_done, : num_values - 1] = drawn
