@@ -70,6 +70,7 @@ def archive(runs_dir: Path, archive_dir: Path) -> None:
     """Archive every finished run of a folder; says what it left out, and how large the archive is."""
     if not runs_dir.is_dir():
         protocol.fail(f"--runs-dir {runs_dir}: no such folder")
+    paths.make_writable("--archive-dir", archive_dir)
     found, left_out = runs.read_runs(runs_dir)
     for line in left_out:
         print(f"not archived: {line}", file=sys.stderr)

@@ -175,7 +175,9 @@ def main(args: Args) -> None:
         seeds = sites.evaluation_seeds(tasks[0], args.sites)
     except ValueError as error:
         sys.exit(f"error: --sites: {error}")
-    folder, physics = args.output_dir or paths.studies() / "best_plans", open_loop.fingerprint()
+    folder = args.output_dir or paths.studies() / "best_plans"
+    paths.make_writable("--output-dir", folder)
+    physics = open_loop.fingerprint()
     for task in tasks:
         path = folder / f"{task.env_id}.csv"
         settings = {"budget": args.budget, "seed": args.seed, "physics": physics}

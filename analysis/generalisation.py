@@ -35,6 +35,7 @@ from analysis import metrics, paths, runs, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
 from cleanrl_style.protocol import reference, sites
+from cleanrl_style.protocol.arguments import ask
 from cleanrl_style.protocol.score import Comparison
 
 TEST, OUTSIDE, SEARCHED = "test", "outside", "test, best plans"
@@ -152,7 +153,17 @@ def task_of(config: dict) -> protocol.Task:
     kwargs = {"thaw_formulation": arguments["thaw_formulation"]} if "thaw_formulation" in config["not_default"] else {}
     if arguments.get("hide_site"):
         kwargs["observation_groups"] = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
-    return protocol.Task.of(arguments["env_id"], **kwargs)
+    return ask(arguments["env_id"], "environment", **kwargs)
+
+
+def config_of(folder: Path) -> dict:
+    """A run's configuration; ValueError names the folder of what is none."""
+    if not (folder / "config.json").is_file():
+        raise ValueError(f"{folder}: no folder of a run")
+    try:
+        return runs.read_config(folder)
+    except ValueError as error:
+        raise ValueError(f"{folder}: {error}") from error
 
 
 def splits_of(task: protocol.Task, wanted: Sequence[str]) -> list[str]:
@@ -168,7 +179,10 @@ def splits_of(task: protocol.Task, wanted: Sequence[str]) -> list[str]:
 def evaluation_of(folder: Path, config: dict, task: protocol.Task, episodes: int, split: str) -> pd.DataFrame:
     """A run's episodes on a split, both policies: of the test sites what it left, else played."""
     if split == TEST:
-        run = runs.read_run(folder)
+        try:
+            run = runs.read_run(folder)
+        except ValueError as error:
+            raise ValueError(f"{folder}: {error}") from error
         if runs.of_another_physics([run]):
             print(f"{folder}: its test sites are of another source of the simulator than this", file=sys.stderr)
         found = run.tables["evaluation"]
@@ -208,10 +222,15 @@ def searched_plans(task: protocol.Task) -> pd.DataFrame | None:
 
 def main(args: Args) -> None:
     """Judge the runs on every split, print the summary, write the sites' ratios."""
+    path = args.output
+    if path is not None:
+        if path.is_dir():
+            sys.exit(f"error: --output {path}: the name of a file is allowed")
+        paths.make_writable("--output", path.parent)
     try:
         if args.episodes < 1:
             raise ValueError(f"--episodes {args.episodes}: 1 or more are allowed")
-        configs = {folder: runs.read_config(folder) for folder in args.runs}
+        configs = {folder: config_of(folder) for folder in dict.fromkeys(args.runs)}
         tasks = [task_of(config) for config in configs.values()]
         env_ids = sorted({task.env_id for task in tasks})
         if len(env_ids) != 1 or not tasks[0].draws_sites:
@@ -234,7 +253,7 @@ def main(args: Args) -> None:
                 found[SEARCHED] = judged(evaluations, best[best.seed.isin(seeds)])
     except (ValueError, FileNotFoundError) as error:
         sys.exit(f"error: {error}")
-    path = args.output or paths.studies() / "generalisation" / f"{tasks[0].env_id}.csv"
+    path = path or paths.studies() / "generalisation" / f"{tasks[0].env_id}.csv"
     settings = {"runs": [str(folder) for folder in args.runs], "episodes": args.episodes, "splits": splits}
     scored = [[policy, split, round(score, 4)] for (policy, split), score in scores.items()]
     table = pd.concat([table.assign(split=split) for split, table in found.items()])

@@ -1,6 +1,10 @@
 """Where runs and results lie: below the folder in which a command is started."""
 
+import errno
+import os
 from pathlib import Path
+
+from cleanrl_style.flags import fail
 
 QUICK = "quick"  # folder of what `reproduce.py --quick` makes, which are no results
 REPOSITORY = Path(__file__).parents[1]
@@ -29,3 +33,13 @@ def studies(quick: bool = False) -> Path:
 def there(folder: Path) -> Path:
     """Where a folder of results is read from: the repository's, if there is none where the command is started."""
     return folder if folder.is_dir() or QUICK in folder.parts else REPOSITORY / folder
+
+
+def make_writable(flag: str, folder: Path) -> None:
+    """Make a folder before anything is computed; a flag's that cannot be written to ends the script with one line."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+    except OSError as error:
+        fail(f"{flag} {folder}: cannot write there ({error.strerror})")

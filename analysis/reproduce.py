@@ -112,6 +112,7 @@ def main(args: Args) -> None:
         check_address(args.address)
     except ValueError as error:
         protocol.fail(f"--{error}")
+    paths.make_writable("runs in", runs_dir)
     protocol.compile_physics(KERNELS)
     waiting = [command(job, runs_dir / "logs") for job in jobs if not finished(job)]
     signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -140,9 +140,10 @@ def run(args: Args) -> pd.DataFrame:
 
 def main(args: Args) -> None:
     """Measure, print and write."""
-    for flag, values in (("--stands", args.stands), ("--threads", args.threads), ("--repeats", (args.repeats,))):
-        if any(value < 1 for value in values):
-            protocol.fail(f"{flag} {min(values)}: at least 1 is needed")
+    if any(number > available_cores() for number in args.threads):
+        protocol.fail(
+            f"--threads {max(args.threads)}: at most {available_cores()}, the cores that are there, is allowed"
+        )
     if args.quick:
         args.stands, args.environments, args.repeats = (16, 64), 64, 1
     try:

@@ -24,6 +24,7 @@ import tyro
 from analysis import archive, commands, paths, runs
 from analysis.tables.common import over_seeds, readable
 from cleanrl_style import protocol
+from cleanrl_style.flags import LIMITS
 from cleanrl_style.protocol import fronts
 from sim.block import LANES, lanes_for
 from sim.executor import HERE, RAY_HERE, NoCluster, check_address, default_address
@@ -78,7 +79,10 @@ def numbers(text: str) -> list[int]:
         match = re.fullmatch(r"(\d+)(?:-(\d+))?", part)
         if match is None:
             protocol.fail(f"--seeds {text}: numbers and ranges are allowed, such as 1-10 or 1,3,7-9")
-        found += range(int(match[1]), int(match[2] or match[1]) + 1)
+        low, high = int(match[1]), int(match[2] or match[1])
+        if high > LIMITS["seed"][1]:
+            protocol.fail(f"--seeds {text}: at most {LIMITS['seed'][1]} is allowed")
+        found += range(low, high + 1)
     if not found or len(set(found)) < len(found):
         protocol.fail(f"--seeds {text}: at least one, and each once, is allowed")
     return found
@@ -86,8 +90,8 @@ def numbers(text: str) -> list[int]:
 
 def arguments_of(script: Path) -> type:
     """The class `Args` of a script."""
-    if not script.is_file():
-        protocol.fail(f"{script}: no script there")
+    if not script.is_file() or script.suffix != ".py":
+        protocol.fail(f"{script}: no script there, a file that ends in .py")
     spec = importlib.util.spec_from_file_location(script.stem, script)
     module = sys.modules[script.stem] = importlib.util.module_from_spec(spec)  # where its help texts are looked for
     spec.loader.exec_module(module)
@@ -187,6 +191,10 @@ def main(args: Args) -> None:
     if args.list:
         print("\n".join(str(run.command) for run in mine))
         return
+    if args.output.is_dir():
+        protocol.fail(f"--output {args.output}: the name of a file is allowed")
+    paths.make_writable("--output", args.output.parent)
+    paths.make_writable("--runs-dir", args.runs_dir)
     try:
         check_address(args.address)
     except NoCluster as error:
@@ -214,7 +222,6 @@ def main(args: Args) -> None:
         print(f"{unfinished} runs of other parts are not finished; the table comes when they are")
         return
     table = table_of(found)
-    args.output.parent.mkdir(parents=True, exist_ok=True)
     with protocol.replacing(args.output) as file:
         table.to_csv(file, index=False, float_format=protocol.FLOAT_FORMAT, lineterminator="\n")
     print(summary(table, list(found[0].settings)).to_string(index=False))

@@ -5,6 +5,7 @@ It loads nothing slow: a bad flag, or a package that is not installed, is answer
 
 import atexit
 import contextlib
+import dataclasses
 import errno
 import importlib.util
 import io
@@ -28,7 +29,7 @@ LIMITS = {
     "group_size": (1, MAX_ENVS),
     "eval_episodes": (1, 10**6),
     "eval_weights": (0, 1),
-    "learning_rate": (0, 1),
+    "learning_rate": (1e-12, 1),
     "gamma": (0, 1),
     "gae_lambda": (0, 1),
     "rollout_steps": (1, 10**9),
@@ -52,6 +53,11 @@ LIMITS = {
     "spacing": (0.01, 10),
     "kills": (0, 1000),
     "workers": (1, 10**4),
+    "environments": (1, 10**6),
+    "threads": (1, 10**4),
+    "repeats": (1, 10**4),
+    "dollars_per_core_hour": (0, 10**6),
+    "dollars_per_gpu_hour": (0, 10**6),
     # of other libraries' algorithms
     "batch_size": (2, 10**6),
     "buffer_episodes": (1, 10**6),
@@ -146,6 +152,7 @@ def parse(arguments: type):
         if not end.code:
             raise
         fail(message_of(errors.getvalue()))
+    check_lists(args)
     check_limits(args)
     if isinstance(getattr(args, "env_id", None), str):
         check_environment(args.env_id)
@@ -159,6 +166,14 @@ def message_of(box: str) -> str:
     first = 2 if rules[0] == 1 else 1  # drawn in ASCII, the title has a rule of its own
     message = " ".join(filter(None, lines[first : rules[first - 1]]))
     return message.partition(" Got errors:")[0]  # of each type that the flag may have
+
+
+def check_lists(args) -> None:
+    """End the script with one line for a flag of several values that was given none."""
+    for field in dataclasses.fields(args):
+        flag = f"--{field.name.replace('_', '-')}"
+        if getattr(args, field.name) == () and flag in sys.argv[1:]:
+            fail(f"{flag}: at least one value is allowed")
 
 
 def check_limits(args) -> None:
@@ -198,7 +213,7 @@ def check_environment(env_id: str) -> None:
     try:
         gym.spec(env_id)
     except gym.error.Error as error:
-        fail(f"--env-id {env_id}: {no_environment(error)}")
+        fail(f"--env-id {env_id or repr(env_id)}: {no_environment(error)}")
 
 
 def no_environment(error: Exception) -> str:

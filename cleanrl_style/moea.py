@@ -214,6 +214,10 @@ if __name__ == "__main__":
     args.num_envs = args.population * episodes_each
     if args.num_envs > protocol.MAX_ENVS:
         protocol.fail(f"--population x --episodes-each = {args.num_envs}: at most {protocol.MAX_ENVS} is allowed")
+    if args.genome != "plan" and args.block_years != Args.block_years:
+        protocol.fail(f"--block-years {args.block_years} is for --genome plan")
+    if args.genome == "plan" and args.block_years > task.years:
+        protocol.fail(f"--block-years {args.block_years}: at most the episode's {task.years} is allowed")
     steps_a_generation = args.num_envs * task.years
     num_generations = args.total_timesteps // steps_a_generation
     if not num_generations:

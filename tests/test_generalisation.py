@@ -228,5 +228,10 @@ def test_a_split_or_a_run_that_is_not_there(run, tmp_path):
         generalisation.main(generalisation.Args(runs=(folder,), episodes=3))
     with pytest.raises(SystemExit, match="--episodes 0: 1 or more are allowed"):
         generalisation.main(generalisation.Args(runs=(folder,), episodes=0))
-    with pytest.raises(SystemExit, match="config.json"):
+    with pytest.raises(SystemExit, match="nowhere: no folder of a run"):
         judge(tmp_path / "nowhere")
+    (tmp_path / "config.json").write_text("{")
+    with pytest.raises(SystemExit, match=f"{tmp_path}: damaged: config.json"):
+        judge(tmp_path)
+    with pytest.raises(SystemExit, match="--output .*: the name of a file is allowed"):
+        generalisation.main(generalisation.Args(runs=(folder,), output=tmp_path))

@@ -188,6 +188,8 @@ def test_a_search_leaves_a_run_and_goes_on_to_the_same_bytes(env_id, vectorizati
         (("--episodes-each", 0), r"--episodes-each must lie in \[1, 1000\], not 0"),
         (("--population", 600), "--population x --episodes-each = 1200: at most 1000 is allowed"),
         (("--total-timesteps", 47), "--total-timesteps 47: at least 48, a generation"),
+        (("--block-years", 7), "--block-years 7 is for --genome plan"),
+        (("--genome", "plan", "--block-years", 51), "--block-years 51: at most the episode's"),
         (("--env-id", "toy_env:toy-lockstep-v0"), "candidates know the boreal environments alone"),
     ],
 )

@@ -105,3 +105,19 @@ def test_a_run_is_as_ours(tmp_path, script, env_id):
     assert json.loads((folders[0] / "config.json").read_text())["arguments"]["total_timesteps"] == 200
     for again in folders[1:]:  # of the two that are played twice
         assert (again / "evaluation.csv").read_bytes() == (folders[0] / "evaluation.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--num-envs", 300), "--num-envs 300: times 5 weights at most 1000 is allowed"),
+        (("--n-steps", 15), "--n-steps 15: a multiple of --num-envs 16 is allowed"),
+        (("--batch-size", 5000), "--batch-size 5000: at most --n-steps 2048 is allowed"),
+        (("--total-timesteps", 79), "--total-timesteps 79: at least 80, a year of every stand for each weight"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_before_a_file_is_written(given, message, tmp_path):
+    pytest.importorskip("sb3_contrib")
+    with pytest.raises(SystemExit, match=message):
+        run_script("analysis/outside/maskable_ppo.py", *given, "--run-dir", tmp_path / "run")
+    assert not (tmp_path / "run").exists()

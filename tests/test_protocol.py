@@ -1,5 +1,8 @@
+import contextlib
 import json
+import signal
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -371,3 +374,11 @@ def test_a_budget_without_room_for_a_batch_is_refused(tmp_path):
             "--total-timesteps",
             8,
         )
+
+
+def test_an_interrupt_that_a_library_swallowed_comes_again():
+    run = SimpleNamespace(stopped=False)
+    with contextlib.suppress(KeyboardInterrupt):
+        protocol.Run._stop(run, signal.SIGTERM, None)
+    with pytest.raises(KeyboardInterrupt):
+        protocol.Run.time(run, "update", 0, 0.0)

@@ -16,8 +16,8 @@ from analysis import commands, sweep
 SCRIPT = ROOT / "cleanrl_style" / "ppo_group.py"
 
 
-def args(folder, seeds="1-2", grid=("learning_rate=1e-4,3e-4",), **changes):
-    return sweep.Args(SCRIPT, seeds, tuple(grid), "none", runs_dir=folder, output=folder / "sweep.csv", **changes)
+def args(folder, seeds="1-2", grid=("learning_rate=1e-4,3e-4",), script=SCRIPT, **changes):
+    return sweep.Args(script, seeds, tuple(grid), "none", runs_dir=folder, output=folder / "sweep.csv", **changes)
 
 
 def finish(runs, shift=0.0):
@@ -89,7 +89,9 @@ def test_a_slurm_array_is_its_parts(tmp_path):
         ({"grid": ["seed=1,2"]}, "unknown flag 'seed'"),
         ({"grid": ["learning_rate"]}, "flag=value"),
         ({"grid": ["learning_rate=fast"]}, "fast"),
-        ({"grid": ["learning_rate=2"]}, r"--learning-rate must lie in \[0, 1\]"),
+        ({"grid": ["learning_rate=2"]}, r"--learning-rate must lie in \[1e-12, 1\]"),
+        ({"seeds": "1-999999999"}, "--seeds 1-999999999: at most 999999 is allowed"),
+        ({"script": ROOT / "README.md"}, "README.md: no script there, a file that ends in .py"),
         ({"grid": ["learning_rate=1e-4,0.0001"]}, "two of its combinations are the same run"),
         ({"part": "4/3"}, "--part 4/3"),
     ],

@@ -200,17 +200,20 @@ class Session:
         return self.own[-1]
 
 
-def main(script: str, arguments: type, learn: Callable, samples: bool) -> None:
+def main(script: str, arguments: type, learn: Callable, samples: bool, check: Callable | None = None) -> None:
     """Train and evaluate as the script of that name.
 
     learn : Session -> policy, a function of weights (n, m), observations (n, d) without the preference, masks (n, 25)
     and accrued returns (n, m) that gives action probabilities (n, 25). samples : whether they are a distribution; if
-    not, the sampled policy is the greedy one, and is played once.
+    not, the sampled policy is the greedy one, and is played once. check : args -> None, ends the script with one line
+    for a bad value before the run begins.
     """
     args = protocol.parse(arguments)
     task = protocol.make_task(args)
     if not task.boreal or task.masks is None:
         protocol.fail(f"--env-id {args.env_id}: a boreal environment that observes the stand is allowed")
+    if check is not None:
+        check(args)
     tables = {"episodes": task.episode_columns, "cost": COST_COLUMNS}
     with protocol.Run(args, task, Path(script).stem, **tables) as run:
         random.seed(args.seed)

@@ -33,9 +33,9 @@ class MaskablePPOArgs(Args):
     num_envs: int = 16
     """stands in lockstep"""
     n_steps: int = 2048
-    """steps of a rollout, summed over all stands"""
+    """steps of a rollout, summed over all stands; fewer where a weight's share of the training is smaller"""
     batch_size: int = 64
-    """steps of a minibatch"""
+    """steps of a minibatch, at most those of a rollout"""
     n_epochs: int = 10
     """passes over the rollout in an update"""
     gamma: float = 0.99
@@ -89,15 +89,38 @@ class Stands(VecEnvWrapper):
         return observations[:, self.hidden :], rewards, ended, infos
 
 
+def rollout(args) -> tuple[int, int]:
+    """Steps of a rollout, in whole years of all stands, and the number of rollouts that a weight's share has."""
+    share = args.total_timesteps // len(args.eval_weights)
+    steps = min(args.n_steps, share) // args.num_envs * args.num_envs
+    return steps, share // steps if steps else 0
+
+
+def check(args) -> None:
+    """Refuse what does not go together."""
+    weights = len(args.eval_weights)
+    if weights * args.num_envs > protocol.MAX_ENVS:
+        protocol.fail(f"--num-envs {args.num_envs}: times {weights} weights at most {protocol.MAX_ENVS} is allowed")
+    if args.n_steps % args.num_envs:
+        protocol.fail(f"--n-steps {args.n_steps}: a multiple of --num-envs {args.num_envs} is allowed")
+    if args.batch_size > args.n_steps:
+        protocol.fail(f"--batch-size {args.batch_size}: at most --n-steps {args.n_steps} is allowed")
+    if rollout(args)[0] < 2:
+        least = max(2, args.num_envs) * weights
+        protocol.fail(
+            f"--total-timesteps {args.total_timesteps}: at least {least}, a year of every stand for each weight"
+        )
+
+
 def learn(session: Session):
     """Train an agent for each weight of the evaluation, one after the other."""
     args, task, agents = session.args, session.task, {}
-    share = args.total_timesteps // len(args.eval_weights)
-    n_steps = min(args.n_steps, share) // args.num_envs * args.num_envs  # whole years of all stands
-    least = max(2, args.num_envs)
-    if n_steps < least:
-        allowed = f"at least {least * len(args.eval_weights)}, a year of every stand for each weight"
-        protocol.fail(f"--total-timesteps {args.total_timesteps}: {allowed}")
+    n_steps, rollouts = rollout(args)
+    whole = n_steps * rollouts * len(args.eval_weights)
+    print(
+        f"{rollouts} rollouts of {n_steps} steps for each weight: {whole:,} of {args.total_timesteps:,} steps",
+        flush=True,
+    )
     for number, given in enumerate(args.eval_weights):
         weights = task.check_weights(given)
         agent = MaskablePPO(
@@ -113,7 +136,7 @@ def learn(session: Session):
             seed=args.seed * len(args.eval_weights) + number,
             device="cpu",
         )
-        agent.learn(share // n_steps * n_steps)  # whole rollouts
+        agent.learn(rollouts * n_steps)
         agents[tuple(np.round(weights, 6))] = agent
 
     def policy(weights, observations, masks, accrued_returns):
@@ -132,4 +155,4 @@ def learn(session: Session):
 
 
 if __name__ == "__main__":
-    main(__file__, MaskablePPOArgs, learn, samples=True)
+    main(__file__, MaskablePPOArgs, learn, samples=True, check=check)

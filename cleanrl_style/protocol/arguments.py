@@ -111,7 +111,7 @@ def ask(env_id: str, flag: str = "--env-id", **env_kwargs) -> Task:
         fail(f"{flag} {no_environment(ValueError(repr(env_id)))}")
     try:
         return Task.of(env_id, **env_kwargs)
-    except (gym.error.Error, ModuleNotFoundError) as error:
+    except (gym.error.Error, ImportError) as error:
         fail(f"{flag} {env_id}: {no_environment(error)}")
     except SyntaxError as error:
         fail(f"{flag} {env_id}: {error.filename}, line {error.lineno}: {error.msg}")
@@ -140,7 +140,8 @@ def fill_in(args, registered: Task) -> None:
         args.eval_weights = evaluation_weights(number)
     elif number != 2 and hasattr(args, "eval_weights") and np.ndim(args.eval_weights) == 1:
         if len(args.eval_weights) % number:
-            fail(f"--eval-weights: {number} numbers a weight, not {len(args.eval_weights)} in all")
+            flag = "--preference" if hasattr(args, "preference") else "--eval-weights"
+            fail(f"{flag}: {number} numbers a weight, not {len(args.eval_weights)} in all")
         args.eval_weights = tuple(map(tuple, np.reshape(args.eval_weights, (-1, number)).tolist()))
 
 

@@ -98,6 +98,7 @@ class Run:
 
     def __init__(self, args, task: Task, script: str, **tables):
         self.args, self.task, self.script = args, task, script
+        self.stopped = False
         changed = not_default(args)
         self.folder = Path(args.run_dir or Path("runs", script, folder_name(args.env_id, changed), f"seed{args.seed}"))
         self.config = {
@@ -326,6 +327,8 @@ class Run:
 
     def time(self, phase: str, global_step: int, seconds: float) -> None:
         """Append to timing.csv, the only file that depends on the clock."""
+        if self.stopped:
+            raise KeyboardInterrupt
         if phase == "environment":
             self.env_seconds, self.env_step = self.env_seconds + seconds, global_step
         with self._writing():
@@ -393,11 +396,16 @@ class Run:
     # ------------------------------------------------------------------------------------- when it stops early
 
     def __enter__(self):
-        self.sigterm = signal.signal(signal.SIGTERM, signal.default_int_handler)
+        self.handlers = {number: signal.signal(number, self._stop) for number in (signal.SIGINT, signal.SIGTERM)}
         return self
 
+    def _stop(self, number, frame) -> None:
+        self.stopped = True  # a compiler's callbacks lose the exception: `time` raises it again
+        raise KeyboardInterrupt
+
     def __exit__(self, kind, error, trace) -> None:
-        signal.signal(signal.SIGTERM, self.sigterm)
+        for number, handler in self.handlers.items():
+            signal.signal(number, handler)
         dead = training_envs.end(self.envs) if self.envs is not None else []
         for table in self.tables.values():
             table.file.close()
