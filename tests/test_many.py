@@ -331,3 +331,16 @@ def test_a_grid_beyond_its_climate():
     file = climate(relative_humidity=(("lat", "lon"), np.full((3, 3), 0.7)))
     with pytest.raises(ValueError, match=r"latitude_deg = 72 lies outside the file's \[55, 65\]"):
         sim.sites_on_grid([72.0], [20.0], climate=file)
+
+
+def test_where_no_store_can_be(tmp_path):
+    with pytest.raises(ValueError, match="path '': the name of a folder is allowed"):
+        sim.simulate_many(table(2), 12, years=1, path="")
+    (tmp_path / "file").touch()
+    with pytest.raises(ValueError, match="path .*file/region.zarr: cannot write there"):
+        sim.simulate_many(table(2), 12, years=1, path=tmp_path / "file" / "region.zarr")
+
+
+def test_a_grid_has_each_point_once():
+    with pytest.raises(ValueError, match=r"latitude_deg: each number once is allowed, got \[56, 56\]"):
+        sim.sites_on_grid([56, 56], [1])

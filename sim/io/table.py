@@ -59,8 +59,13 @@ def open_table(source) -> Table:
             raise ValueError(
                 f"forcing: {path.name}: no NetCDF file, or netCDF4 or h5netcdf is not installed, which read it"
             ) from error
-        with opened as dataset:
-            return _in_memory(_of_one_place(dataset, path.name), path.name)
+        try:
+            with opened as dataset:
+                return _in_memory(_of_one_place(dataset, path.name), path.name)
+        except ValueError as error:  # of xarray's own where a file is damaged
+            if path.name in str(error):
+                raise
+            raise ValueError(f"forcing: {path.name}: {error}") from error
     if path.suffix in (".zip", ".xlsx", ".xls", ".grib"):
         raise ValueError(
             f"forcing: {path.name}: a CSV file (also .gz) or a NetCDF file is allowed; unpack or export it"

@@ -46,6 +46,8 @@ def check_axis(name: str, values) -> np.ndarray:
         allowed = np.ndim(values) == 1 and len(numbers) and ((numbers >= low) & (numbers <= high)).all()
     except (TypeError, ValueError):  # text, or rows of several lengths
         allowed = False
+    if allowed and len(numbers) < len(values):
+        raise ValueError(f"{name}: each number once is allowed, got {values!r}")
     if not allowed:
         raise ValueError(f"{name}: a sequence of numbers in [{low:g}, {high:g}] {unit} is allowed, got {values!r}")
     return numbers

@@ -452,6 +452,8 @@ class Store:
     """
 
     def __init__(self, path, plan: Plan, label: str, overwrite: bool):
+        if path is not None and not Path(path).name:
+            raise ValueError(f"path {path!r}: the name of a folder is allowed")
         self.plan = plan
         self.settings = {
             "simulator": simulator(),
@@ -486,7 +488,10 @@ class Store:
                 if not data.exists():  # killed after its last act but one
                     shutil.rmtree(self.partial, ignore_errors=True)
                 return self
-        self.partial.mkdir(parents=True, exist_ok=True)
+        try:
+            self.partial.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ValueError(f"path {self.path}: cannot write there ({error.strerror})") from error
         self.lock = locked(self.partial / "lock", self.path)
         try:
             if self.overwrite:
