@@ -102,7 +102,7 @@ def say_what_was_not_run(what: str, lines: list[str]) -> None:
 def main(args: Args) -> None:
     """Write every table; print the main one's rows that have runs, and what was left out or is missing."""
     results = Results.load(args.quick, args.runs_dir)
-    print(f"tables of {len(results.runs)} runs", file=sys.stderr, flush=True)
+    print(f"tables of {len(results.runs)} runs\n", flush=True)
     rows = results.rows  # completes left_out
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)

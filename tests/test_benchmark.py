@@ -59,7 +59,7 @@ def test_the_script_writes_its_tables(tmp_path, capsys):
 
 @pytest.mark.parametrize("arguments", [("--only", "everything"), ("--repeats", 0)])
 def test_a_bad_argument_is_refused(arguments, tmp_path):
-    with pytest.raises(SystemExit, match=f"{arguments[0]} {arguments[1]}"):
+    with pytest.raises(SystemExit, match=f"{arguments[0]} .*{arguments[1]}"):
         run_script("analysis/benchmark.py", *arguments, "--output-dir", tmp_path)
 
 
