@@ -26,7 +26,7 @@ from sim.block import kernel, lanes_for
 from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS, as_array
 from sim.parameters import check_name, check_overrides, check_seed
-from sim.stands import available_cores, positive_integer
+from sim.stands import check_threads, positive_integer
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
 from sim.task.episodes import (
     BALANCED_WORLD,
@@ -109,8 +109,7 @@ def warm_up(num_envs: int = 1, threads: int | None = None) -> None:
 
     Called before worker processes are forked (with 1: each has one stand), it saves each of them the compilation.
     """
-    threads = available_cores() if threads is None else positive_integer("threads", threads)
-    kernel(lanes_for(positive_integer("num_envs", num_envs), threads))
+    kernel(lanes_for(positive_integer("num_envs", num_envs), check_threads(threads)))
 
 
 class Described:
@@ -270,7 +269,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     def __init__(self, *, render_mode: str | None = None, **kwargs):
         EzPickle.__init__(self, render_mode=render_mode, **kwargs)
         if render_mode is not None:
-            check_name("render_mode", render_mode, self.metadata["render_modes"])
+            check_name("render_mode", render_mode, [*self.metadata["render_modes"], "None"])
             if importlib.util.find_spec("matplotlib") is None:
                 raise gym.error.DependencyNotInstalled('render_mode "rgb_array": pip install matplotlib')
         self.render_mode = render_mode

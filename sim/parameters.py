@@ -146,8 +146,11 @@ def middle_site(overrides: dict | None = None) -> dict[str, float]:
 def scale_site(site: dict[str, float]) -> np.ndarray:
     """The observed parameters as shares of their sampled ranges: 0 at the low end, 1 at the high end.
 
-    Shape (number of `OBSERVED_SITE_PARAMETERS`,).
+    Shape (number of `OBSERVED_SITE_PARAMETERS`,). Raises ValueError for a site that lacks one.
     """
+    if missing := [name for name in OBSERVED_SITE_PARAMETERS if name not in check_mapping("site", site)]:
+        more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+        raise ValueError(f"site: {', '.join(missing[:3])}{more} missing; sim.sample_site and sim.middle_site give all")
     observed = ((site[name], SITE_PARAMETERS[name]) for name in OBSERVED_SITE_PARAMETERS)
     return np.array([(value - p.low) / (p.high - p.low) for value, p in observed])
 

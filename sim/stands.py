@@ -60,6 +60,7 @@ from sim.state import (
 ARRAYS = ("parameters", "state", "record", "years")  # of what a state saves
 SAVED = (*ARRAYS, "seeds", "weather", "disturbance")  # that the future depends on
 LONGEST_STEP_MINUTES = 120  # beyond, the air is up to 2 K too warm
+MOST_THREADS = 10_000  # so that a mistake of a thousandfold is named
 
 
 class Stands:
@@ -123,7 +124,7 @@ class Stands:
             raise ValueError(f"constants: {CO2} follows the scenario; a value of your own is not allowed")
         self.first_cut_age = first_cut_age(harvest_min_class, self.constants)
         self.products_decay = yearly_decay(hwp_half_life_years)
-        self.threads = available_cores() if threads is None else positive_integer("threads", threads)
+        self.threads = check_threads(threads)
         self.lanes = lanes_for(self.number, self.threads)
         self._run_block: Callable = partial(run_block, self.lanes, backend=backend)
         if backend == "cuda":
@@ -416,3 +417,12 @@ def positive_integer(name, value) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 1:
         raise ValueError(f"{name}: a positive integer is allowed, got {value!r}")
     return int(value)
+
+
+def check_threads(threads) -> int:
+    """How many threads: one a core for None, else as many as were given. Raises ValueError for what no machine has."""
+    if threads is None:
+        return available_cores()
+    if positive_integer("threads", threads) > MOST_THREADS:
+        raise ValueError(f"threads: at most {MOST_THREADS} are allowed, got {threads}")
+    return int(threads)

@@ -22,6 +22,13 @@ def daily():
     return sim.simulate(output="daily", **RUN)
 
 
+@pytest.mark.parametrize("columns", [RECORD, DAILY])
+def test_every_column_has_a_meaning_of_its_own(columns):
+    meanings = [meaning for _, meaning in columns.values()]
+    assert len(set(meanings)) == len(meanings)
+    assert not [m for m in meanings if m == "mean" or m.startswith(("part of", "of which", "the same"))]
+
+
 def test_every_column_of_both_tables_is_there(dataset):
     assert {*VARIABLES, *PROFILE} == {*DAILY, "nee_kgc_m2"}
     assert {name for name in dataset if name.startswith("annual_")} == {

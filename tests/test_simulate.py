@@ -329,6 +329,14 @@ def test_sampled_sites_lie_in_their_ranges(seed):
     assert scaled[sim.OBSERVED_SITE_PARAMETERS.index("q10")] == pytest.approx((site["q10"] - 1.8) / 0.5)
 
 
+@pytest.mark.parametrize(
+    "site, named", [({"q10": 2}, "latitude_deg, .* and 58 more missing"), (3, "a dict .* got int")]
+)
+def test_shares_of_half_a_site_are_refused(site, named):
+    with pytest.raises(ValueError, match=f"site: {named}"):
+        sim.scale_site(site)
+
+
 def test_mean_annual_temperature_follows_latitude():
     assert mean_annual_temperature(60.5, 0.5) == pytest.approx(-7.5, abs=1e-6)
     assert mean_annual_temperature(56.0, 0.5) < -5.0  # the upper half of the normal is cut off

@@ -168,6 +168,7 @@ BAD_VECTORS = {
     "group of three in four": ((4, {"group_size": 3}), r"group_size = 3: a divisor of num_envs = 4"),
     "group of none": ((4, {"group_size": 0}), r"group_size: an integer in \[1, 1000000\] is allowed, got 0"),
     "no threads": ((2, {"threads": 0}), r"threads: a positive integer is allowed, got 0"),
+    "a million threads": ((2, {"threads": 10**6}), r"threads: at most 10000 are allowed, got 1000000"),
     "drawing": ((4, {"render_mode": "rgb_array"}), r"render_mode 'rgb_array'"),
 }
 

@@ -7,6 +7,7 @@ episodes, of another environment or another physics are measured when they are f
 
 import ast
 import contextlib
+import csv
 import functools
 import gzip
 import hashlib
@@ -39,6 +40,8 @@ FOLDER = "reference"
 FLOAT_FORMAT = "%.6g"
 # Of the simulator, what reads, draws, sends or plays, and makes no number of a year.
 NO_PHYSICS = ("executor.py", "io", "task/fronts.py", "task/grid.py", "task/many.py", "task/picture.py")
+#: Sources that were compared with an earlier one and make its numbers to the bit: analysis/same_physics.py.
+SAME_PHYSICS = Path(str(files("cleanrl_style.protocol"))) / "same_physics.csv"
 
 
 def title(plan: str) -> str:
@@ -64,8 +67,15 @@ def physics_name() -> str:
     return source()[:16]
 
 
-@functools.cache
 def source() -> str:
+    """Hash of the first source that makes the same numbers as this one (`SAME_PHYSICS`): its own, if none is noted."""
+    with SAME_PHYSICS.open(newline="") as file:
+        noted = {row["source"]: row["stands_for"] for row in csv.DictReader(file)}
+    return noted.get(own_source(), own_source())
+
+
+@functools.cache
+def own_source() -> str:
     """Hash of source and tables of simulator and environment, but for `NO_PHYSICS`."""
     simulator, digest = Path(str(files("sim"))), hashlib.sha256()
     apart = [simulator / name for name in NO_PHYSICS]

@@ -76,8 +76,7 @@ def to_dataset(
     variables: dict[str, tuple] = {}
     for column, (name, (unit, factor), standard_name, of_times) in VARIABLES.items():
         values = daily[column].to_numpy() * factor + (FREEZING_POINT_K if unit == "K" else 0.0)
-        meaning = columns[column][1]  # of some it says only how the day's value is made
-        long_name = column.removesuffix("_c").replace("_", " ") if meaning == "mean" else meaning
+        long_name = columns[column][1]
         attributes = {"long_name": long_name, "units": unit, **of_times}
         if standard_name:
             attributes["standard_name"] = standard_name

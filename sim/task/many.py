@@ -30,7 +30,7 @@ from sim.executor import HERE, each
 from sim.management import NUM_ACTIONS, as_array, check_actions
 from sim.parameters import check_name, check_seed
 from sim.spin_up import BOUNDARY, CLASS_NAMES, INITIAL_LIMITS, LARGEST_STEM_KGC, check_initial
-from sim.stands import available_cores
+from sim.stands import check_threads
 from sim.state import RECORD
 from sim.task.actions import NO_CHANGE
 from sim.task.episodes import ARGUMENTS, DEFAULT_YEARS, Episodes
@@ -147,7 +147,7 @@ def simulate_many(
         variables=check_variables(variables, one.history_names),
         arguments=arguments,
         size=size,
-        threads=(available_cores() if threads is None else threads) if address == HERE else 1,
+        threads=check_threads(threads) if address == HERE else 1,
     )
     with Store(path, plan, label, overwrite) as store:
         lanes = lanes_for(size, plan.threads)
