@@ -4,6 +4,7 @@ Soil, snow and water start near the site's means and are spun up under the mean 
 held fixed. Deep soil remembers decades, more where it freezes; a secant search on its heat finds the balance in a few.
 """
 
+import functools
 import math
 from statistics import NormalDist
 
@@ -20,7 +21,7 @@ from sim.state import DAYS, STATE
 enthalpy, temperature = uncompiled(soil.enthalpy), uncompiled(soil.temperature)
 node_capacities = uncompiled(soil.node_capacities)
 layer_capacities = uncompiled(organic.layer_capacities)
-crown_factor = uncompiled(structure.crown_factor)
+crown_factor, weight = uncompiled(structure.crown_factor), uncompiled(stem_weight)
 
 SPIN_UP_YEARS = 8
 SPIN_UP_STEPS_PER_DAY = 12
@@ -180,10 +181,23 @@ def crown_covers(stems: np.ndarray, parameters: dict) -> np.ndarray:
     for k, species in enumerate(("conifer", "deciduous")):
         grown_as = species if parameters["crown_development"] else "conifer"
         factors = [parameters[f"crown_{grown_as}_{size}"] for size in AGE_CLASSES]
-        relative = np.array([crown_factor(age, *factors) for age in range(AGES)])
-        crowns[k] = stems[k] @ relative * parameters[f"crown_area_{species}_m2"] / SQUARE_METRES_PER_HECTARE
+        relative = stems[k] @ crowns_by_age(*factors)
+        crowns[k] = relative * parameters[f"crown_area_{species}_m2"] / SQUARE_METRES_PER_HECTARE
     area = crowns.sum()
     return (1.0 - math.exp(-area)) * crowns / area if area > 0.0 else crowns
+
+
+@functools.lru_cache(maxsize=1024)
+def crowns_by_age(*factors: float) -> np.ndarray:
+    """Crown area of a stem relative to a mature one, shape (AGES,), from that of each age class."""
+    return read_only([crown_factor(age, *factors) for age in range(AGES)])
+
+
+def read_only(values) -> np.ndarray:
+    """An array that many sites share."""
+    array = np.array(values)
+    array.flags.writeable = False
+    return array
 
 
 def first_stems(state: np.ndarray) -> np.ndarray:
@@ -214,29 +228,30 @@ def middle_stocks(ranges: dict) -> dict[str, float]:
 
 def stem_sizes(parameters: dict) -> np.ndarray:
     """Carbon of a stem by species and age [kgC], shape (2, AGES), `LARGEST_STEM_KGC` at the last age."""
-    weight = uncompiled(stem_weight)
-    sizes = [
+    exponent = parameters["stem_carbon_exponent"]
+    return np.array(
         [
-            weight(
-                age,
-                parameters[f"height_rate_{species}"],
-                parameters[f"height_shape_{species}"],
-                parameters["stem_carbon_exponent"],
-            )
-            for age in range(AGES)
+            sizes_by_age(parameters[f"height_rate_{species}"], parameters[f"height_shape_{species}"], exponent)
+            for species in ("conifer", "deciduous")
         ]
-        for species in ("conifer", "deciduous")
-    ]
-    return LARGEST_STEM_KGC * np.array([species / species[-1] for species in np.array(sizes)])
+    )
 
 
+@functools.lru_cache(maxsize=1024)
+def sizes_by_age(rate: float, shape: float, exponent: float) -> np.ndarray:
+    """Carbon of a stem of one species [kgC], shape (AGES,)."""
+    sizes = np.array([weight(age, rate, shape, exponent) for age in range(AGES)])
+    return read_only(LARGEST_STEM_KGC * (sizes / sizes[-1]))
+
+
+@functools.lru_cache(maxsize=1024)
 def stems_of_ages(oldest_age: float, youngest_age: float = 1) -> np.ndarray:
     """Shares of stems by age, shape (AGES,): the youngest to the oldest, fewer by `YEARLY_SURVIVAL` each year."""
     ages = np.zeros(AGES)
     oldest, youngest = (max(1, int(round(age))) for age in (oldest_age, youngest_age))
     years = np.arange(youngest, oldest + 1)
     np.add.at(ages, np.minimum(years, OLDEST), YEARLY_SURVIVAL ** (years - youngest))
-    return ages / ages.sum()
+    return read_only(ages / ages.sum())
 
 
 def stems_of_size(mean_kgc: float, sizes: np.ndarray) -> np.ndarray:
