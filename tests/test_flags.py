@@ -1,6 +1,6 @@
 """What a script says at once: of a bad flag, of a missing package, of a terminal that cannot take its output."""
 
-import importlib
+import importlib.util
 import os
 import re
 import subprocess
@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 from scripts import ROOT, run_script
 
-from analysis.outside import common
+from analysis.outside import arguments
 from cleanrl_style import flags
 
 SCRIPTS = sorted(path.stem for path in (ROOT / "cleanrl_style").glob("*.py") if "\nclass Agent" in path.read_text())
+OUTSIDE = sorted(path.stem for path in (ROOT / "analysis" / "outside").glob("*.py") if "parse(" in path.read_text())
 
 
 def python(*arguments, **options):
@@ -29,6 +30,16 @@ def test_a_bad_flag_is_answered_before_anything_slow_is_loaded(script):
     _, err = python("-X", "importtime", ROOT / "cleanrl_style" / f"{script}.py", "--sed", "3").communicate()
     *loaded, answer = err.splitlines()
     assert answer.startswith("error: Unrecognized options: --sed")
+    assert not {"torch", "numba", "pandas", "gymnasium"} & {line.split("|")[-1].strip() for line in loaded}
+
+
+@pytest.mark.parametrize("script", OUTSIDE)
+def test_other_libraries_algorithms_answer_as_soon(script):
+    if importlib.util.find_spec(library := "sb3_contrib" if script == "maskable_ppo" else "morl_baselines") is None:
+        pytest.skip(f"{library} is not installed")
+    _, err = python("-X", "importtime", ROOT / "analysis" / "outside" / f"{script}.py", "--seed", "x").communicate()
+    *loaded, answer = err.splitlines()
+    assert answer.startswith("error: Error parsing --seed: ")
     assert not {"torch", "numba", "pandas", "gymnasium"} & {line.split("|")[-1].strip() for line in loaded}
 
 
@@ -135,5 +146,5 @@ def test_the_trial_that_help_shows_can_be_made(monkeypatch, script):
 
 
 def test_what_help_says_of_another_librarys_algorithm():
-    text = flags.describe(common.Args)
+    text = flags.describe(arguments.Args)
     assert "lockstep" not in text and "starts over" in text and "updates.csv" not in text

@@ -12,48 +12,17 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Literal
 
 import gymnasium as gym
 import numpy as np
 import pandas as pd
 import torch
 
+from analysis.outside.arguments import Args
 from cleanrl_style import protocol
 
 INVALID = -1e8  # as a value or a logit: never the highest, and its probability is exactly 0
 COST_COLUMNS = ("steps", "own_evaluation_steps", "peak_memory_mb")
-
-
-@dataclass
-class Args:
-    """The arguments that all the commands have."""
-
-    seed: int = 1
-    """seed of the run: networks, sampling and training episodes"""
-    env_id: str | None = None
-    """a boreal environment of two or more objectives (None: the mode's)"""
-    mode: Literal["generalist", "site-specific"] | None = None
-    """a new site and weather in every episode, or one fixed site (None: the environment's)"""
-    site_seed: int | None = None
-    """another fixed site in site-specific mode; in generalist mode one site, under new weather in every episode"""
-    thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] | None = None
-    """formula of the thaw reward (None: the environment's, asymmetric)"""
-    total_timesteps: int | None = None
-    """steps of training (None: 300000, in site-specific mode 100000)"""
-    eval_episodes: int = 200
-    """evaluation episodes per weight, each on a site of its own"""
-    eval_weights: tuple[float, ...] | None = None
-    """carbon weights of the evaluation (None: 0 0.25 .. 1); of three and more objectives, as many numbers a weight"""
-    run_dir: str | None = None
-    """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
-    overwrite: bool = False
-    """start over in a folder that already holds a run"""
-
-    num_envs: ClassVar[int] = 1  # morl-baselines steps one
-    trial: ClassVar = (2000, "half an hour to five hours")  # what `--help` says
-    left: ClassVar = """A stopped run starts over.
-The folder gets config.json, episodes.csv, cost.csv, evaluation.csv and summary.png, which docs/outside.md explains"""
 
 
 # ---------------------------------------------------------------------------------------------- the environment
@@ -200,7 +169,7 @@ class Session:
         return self.own[-1]
 
 
-def main(script: str, arguments: type, learn: Callable, samples: bool, check: Callable | None = None) -> None:
+def main(script: str, args: Args, learn: Callable, samples: bool, check: Callable | None = None) -> None:
     """Train and evaluate as the script of that name.
 
     learn : Session -> policy, a function of weights (n, m), observations (n, d) without the preference, masks (n, 25)
@@ -208,7 +177,6 @@ def main(script: str, arguments: type, learn: Callable, samples: bool, check: Ca
     not, the sampled policy is the greedy one, and is played once. check : args -> None, ends the script with one line
     for a bad value before the run begins.
     """
-    args = protocol.parse(arguments)
     task = protocol.make_task(args)
     if not task.boreal or task.masks is None:
         protocol.fail(f"--env-id {args.env_id}: a boreal environment that observes the stand is allowed")

@@ -7,14 +7,10 @@ Settings are those of the library's example of discrete actions (minecart), but 
 
 from dataclasses import dataclass
 
-from cleanrl_style.flags import require
+from analysis.outside.arguments import Args
+from cleanrl_style.flags import parse, require
 
 require("morl_baselines", extra="outside")
-
-import torch
-from morl_baselines.multi_policy.envelope.envelope import Envelope
-
-from analysis.outside.common import Args, Session, best_actions, main, masked
 
 
 @dataclass
@@ -35,6 +31,15 @@ class EnvelopeArgs(Args):
     """steps between copies of the network to its target"""
     homotopy_decay_steps: int = 10_000
     """steps in which the loss goes from the vector's to the scalarised"""
+
+
+if __name__ == "__main__":
+    args = parse(EnvelopeArgs)  # a bad flag is answered before the libraries are loaded
+
+import torch
+from morl_baselines.multi_policy.envelope.envelope import Envelope
+
+from analysis.outside.common import Session, best_actions, main, masked
 
 
 def learn(session: Session):
@@ -71,4 +76,4 @@ def learn(session: Session):
 
 
 if __name__ == "__main__":
-    main(__file__, EnvelopeArgs, learn, samples=False)
+    main(__file__, args, learn, samples=False)

@@ -8,15 +8,10 @@ its own evaluation, which count in no budget; cost.csv says how many steps they 
 
 from dataclasses import dataclass
 
-from cleanrl_style.flags import require
+from analysis.outside.arguments import Args
+from cleanrl_style.flags import parse, require
 
 require("morl_baselines", extra="outside")
-
-import numpy as np
-import torch
-from morl_baselines.multi_policy.gpi_pd.gpi_pd import GPILS
-
-from analysis.outside.common import Args, Session, best_actions, main, masked
 
 
 @dataclass
@@ -39,6 +34,16 @@ class GPILSArgs(Args):
     """steps for each chosen weight"""
     own_episodes: int = 5
     """episodes of each of its own evaluations"""
+
+
+if __name__ == "__main__":
+    args = parse(GPILSArgs)  # a bad flag is answered before the libraries are loaded
+
+import numpy as np
+import torch
+from morl_baselines.multi_policy.gpi_pd.gpi_pd import GPILS
+
+from analysis.outside.common import Session, best_actions, main, masked
 
 
 def learn(session: Session):
@@ -81,4 +86,4 @@ def learn(session: Session):
 
 
 if __name__ == "__main__":
-    main(__file__, GPILSArgs, learn, samples=False)
+    main(__file__, args, learn, samples=False)

@@ -7,21 +7,10 @@ Settings are the library's own, but for the stands: 16 in lockstep, which the li
 
 from dataclasses import dataclass
 
-from cleanrl_style.flags import require
+from analysis.outside.arguments import Args
+from cleanrl_style.flags import parse, require
 
 require("sb3_contrib", extra="outside")
-
-import time
-
-import gymnasium as gym
-import numpy as np
-import torch
-from sb3_contrib import MaskablePPO
-from stable_baselines3.common.vec_env import VecEnvWrapper
-
-from analysis.outside.common import Args, Session, main
-from cleanrl_style import protocol
-from cleanrl_style.protocol import training_envs
 
 
 @dataclass
@@ -44,6 +33,22 @@ class MaskablePPOArgs(Args):
     """lambda of generalised advantage estimation"""
     ent_coef: float = 0.0
     """weight of the entropy bonus"""
+
+
+if __name__ == "__main__":
+    args = parse(MaskablePPOArgs)  # a bad flag is answered before the libraries are loaded
+
+import time
+
+import gymnasium as gym
+import numpy as np
+import torch
+from sb3_contrib import MaskablePPO
+from stable_baselines3.common.vec_env import VecEnvWrapper
+
+from analysis.outside.common import Session, main
+from cleanrl_style import protocol
+from cleanrl_style.protocol import training_envs
 
 
 class Stands(VecEnvWrapper):
@@ -155,4 +160,4 @@ def learn(session: Session):
 
 
 if __name__ == "__main__":
-    main(__file__, MaskablePPOArgs, learn, samples=True, check=check)
+    main(__file__, args, learn, samples=True, check=check)

@@ -8,16 +8,10 @@ its archive by its own evaluation, which counts in no budget; cost.csv says how 
 
 from dataclasses import dataclass
 
-from cleanrl_style.flags import require
+from analysis.outside.arguments import Args
+from cleanrl_style.flags import parse, require
 
 require("morl_baselines", extra="outside")
-
-import numpy as np
-import torch
-from morl_baselines.common.buffer import ReplayBuffer
-from morl_baselines.multi_policy.morld.morld import MORLD
-
-from analysis.outside.common import Args, Session, main, masked
 
 
 @dataclass
@@ -38,6 +32,17 @@ class MORLDArgs(Args):
     """aim of the policies' entropy, in that of 25 equal actions"""
     own_episodes: int = 5
     """episodes of each of its own evaluations"""
+
+
+if __name__ == "__main__":
+    args = parse(MORLDArgs)  # a bad flag is answered before the libraries are loaded
+
+import numpy as np
+import torch
+from morl_baselines.common.buffer import ReplayBuffer
+from morl_baselines.multi_policy.morld.morld import MORLD
+
+from analysis.outside.common import Session, main, masked
 
 
 class SharedBuffer(ReplayBuffer):
@@ -100,4 +105,4 @@ def learn(session: Session):
 
 
 if __name__ == "__main__":
-    main(__file__, MORLDArgs, learn, samples=True)
+    main(__file__, args, learn, samples=True)

@@ -7,17 +7,10 @@ At a weight it is told the return of the best episode for that weight that it re
 
 from dataclasses import dataclass
 
-from cleanrl_style.flags import require
+from analysis.outside.arguments import Args
+from cleanrl_style.flags import parse, require
 
 require("morl_baselines", extra="outside")
-
-import numpy as np
-import torch
-from morl_baselines.common.pareto import get_non_dominated_inds
-from morl_baselines.multi_policy.pcn.pcn import PCN, DiscreteActionsDefaultModel
-
-from analysis.outside.common import INVALID, Args, NoEnv, Session, main, valid_actions
-from cleanrl_style import protocol
 
 
 @dataclass
@@ -40,6 +33,18 @@ class PCNArgs(Args):
     """episodes between updates"""
     num_model_updates: int = 50
     """updates between episodes"""
+
+
+if __name__ == "__main__":
+    args = parse(PCNArgs)  # a bad flag is answered before the libraries are loaded
+
+import numpy as np
+import torch
+from morl_baselines.common.pareto import get_non_dominated_inds
+from morl_baselines.multi_policy.pcn.pcn import PCN, DiscreteActionsDefaultModel
+
+from analysis.outside.common import INVALID, NoEnv, Session, main, valid_actions
+from cleanrl_style import protocol
 
 
 def learn(session: Session):
@@ -97,4 +102,4 @@ def learn(session: Session):
 
 
 if __name__ == "__main__":
-    main(__file__, PCNArgs, learn, samples=True)
+    main(__file__, args, learn, samples=True)
