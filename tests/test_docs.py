@@ -44,7 +44,7 @@ def test_commands_name_scripts_and_flags_that_exist(page):
             continue
         known = fields(ROOT / script) | (SHARED if "analysis" not in script else set())
         if script.startswith("analysis/outside/"):
-            known |= fields(ROOT / "analysis" / "outside" / "common.py")
+            known |= fields(ROOT / "analysis" / "outside" / "arguments.py")
         flags = [flag.replace("-", "_") for flag in re.findall(r"(?<!\S)--([a-z][\w-]*)", rest)]
         wrong += [f"{script} --{flag}" for flag in flags if flag not in {*known, "help"}]
     assert wrong == []
