@@ -25,7 +25,7 @@ if not Path(__file__).with_name("sim").samefile(_found := getattr(sim, "__path__
 from sim.block import kernel, lanes_for
 from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS, as_array
-from sim.parameters import check_name, check_overrides, check_seed
+from sim.parameters import brief, check_name, check_overrides, check_seed
 from sim.stands import check_threads, positive_integer
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
 from sim.task.episodes import (
@@ -269,7 +269,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     def __init__(self, *, render_mode: str | None = None, **kwargs):
         EzPickle.__init__(self, render_mode=render_mode, **kwargs)
         if render_mode is not None:
-            check_name("render_mode", render_mode, [*self.metadata["render_modes"], "None"])
+            if render_mode not in self.metadata["render_modes"]:
+                raise ValueError(f"render_mode {brief(render_mode)}: allowed are rgb_array, None")
             if importlib.util.find_spec("matplotlib") is None:
                 raise gym.error.DependencyNotInstalled('render_mode "rgb_array": pip install matplotlib')
         self.render_mode = render_mode

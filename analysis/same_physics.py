@@ -6,7 +6,8 @@ Runs and reference returns carry a hash of the source of simulator and environme
 an equation does. This plays the same episodes with the source of a commit and with that of the working tree, in every
 environment, in lockstep and alone. If all numbers have the same bits, it notes in
 cleanrl_style/protocol/same_physics.csv that this source stands for that one, and archived runs stay of this physics.
-If not, it says where they differ and notes nothing: what changed is physics. Two minutes.
+If not, it says where they differ and notes nothing: what changed is physics. Two to four minutes, in which both sources
+are compiled.
 """
 
 import csv
@@ -19,6 +20,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 
 import boreal_env
@@ -26,7 +28,7 @@ import sim
 from cleanrl_style import protocol
 from cleanrl_style.protocol import reference
 
-#: What is played: environment and arguments. Every way in which numbers are made is there once.
+#: What is played: environment and arguments. Not played are the GPU, the interpreter, and other arguments than these.
 PLAYED = (
     ("boreal-generalist-v0", {}),
     ("boreal-generalist-v0", {"thaw_formulation": "contrast"}),
@@ -48,7 +50,7 @@ class Args:
     before: str = "HEAD"
     """commit whose source the working tree's is compared with"""
     changed: str = ""
-    """what was changed, in a few words, for the note"""
+    """what was changed since the source that it stands for, in a few words, for the note"""
     digests: bool = False
     """print the digests of the source that python finds, and stop (what is called for each of the two)"""
 
@@ -70,7 +72,7 @@ def digests() -> dict[str, str]:
 
 def played(env_id: str, arguments: dict, stands: int):
     """Observations, rewards and records of an episode's years under random actions."""
-    envs = boreal_env.gym.make_vec(env_id, num_envs=stands, record_steps=True, **arguments)
+    envs = gym.make_vec(env_id, num_envs=stands, record_steps=True, **arguments)
     generator = np.random.default_rng(SEED)
     observations, _ = envs.reset(seed=SEED)
     yield observations

@@ -239,7 +239,7 @@ def stem_sizes(parameters: dict) -> np.ndarray:
 
 @functools.lru_cache(maxsize=1024)
 def sizes_by_age(rate: float, shape: float, exponent: float) -> np.ndarray:
-    """Carbon of a stem of one species [kgC], shape (AGES,)."""
+    """Carbon of a stem of one species by age [kgC], shape (AGES,); rate [yr-1], shape, exponent: of `stem_weight`."""
     sizes = np.array([weight(age, rate, shape, exponent) for age in range(AGES)])
     return read_only(LARGEST_STEM_KGC * (sizes / sizes[-1]))
 

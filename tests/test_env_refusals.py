@@ -78,7 +78,8 @@ BAD_ARGUMENTS = {
     "weather": ({"weather": None}, r"weather None: allowed are paper, observed"),
     "balanced of number": ({"balanced": 1.4}, r"balanced: True or False is allowed, got 1.4"),
     "record of number": ({"record_years": 1}, r"record_years: True or False is allowed, got 1"),
-    "render mode": ({"render_mode": "human"}, r"render_mode 'human': allowed are rgb_array"),
+    "render mode": ({"render_mode": "human"}, r"render_mode 'human': allowed are rgb_array, None$"),
+    "render mode of text": ({"render_mode": "None"}, r"render_mode 'None': allowed are rgb_array, None$"),
 }
 
 
