@@ -134,9 +134,9 @@ def flags(setting: str) -> str:
 
 
 def titled(script: str, shown_flags: str) -> str:
-    """A method's name and its flags; MOEA/D is a flag of NSGA-II's script."""
-    if (script, shown_flags) == ("moea", "`--algorithm moead`"):
-        return "MOEA/D"
+    """A method's name and its flags, but those that name it."""
+    if (script, shown_flags.strip("`")) in methods.BY_FLAGS:
+        return methods.title(script, shown_flags.strip("`"))
     return ", ".join(filter(None, (methods.title(script), shown_flags)))
 
 
@@ -248,7 +248,7 @@ def averaged(results: Results) -> str:
         return "Not run yet: `python analysis/studies/ensembles.py`.\n"
     rows = {}
     for task, of_task in table.groupby("task", sort=False):
-        alone = main_points.default_rows(results, task).get(ensembles.SCRIPT, [])
+        alone = main_points.default_rows(results, task).get((ensembles.SCRIPT, ""), [])
         if not alone or alone[0].plans is None:
             continue
         sets = {1: pd.DataFrame([metrics.of_sites(one.by_policy["greedy"]) for one in alone])}

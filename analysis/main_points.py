@@ -18,12 +18,14 @@ SIX = (PLANTING, "eupg_var_lambda", "ppo_gated", "ppo_curriculum", "ppo_group")
 NOT_RUN = "Not run yet: `python analysis/reproduce.py --only main balanced`.\n"
 
 
-def default_rows(results, env_id: str) -> dict[str, list]:
-    """Script -> its runs in an environment as its defaults are, of those that have runs."""
+def default_rows(results, env_id: str) -> dict[tuple[str, str], list]:
+    """(Script, flags that make it a method) -> its runs in an environment, as the method's defaults are."""
     return {
-        script: replicates
+        (script, flags): replicates
         for (script, its_env, setting), replicates in results.rows_of_two_objectives().items()
-        if its_env == env_id and replicates and setting in ("default", "vectorization=lockstep")
+        if its_env == env_id and replicates
+        for flags in (methods.flags(setting),)
+        if not flags or (script, flags) in methods.BY_FLAGS
     }
 
 
@@ -50,7 +52,7 @@ def six_rows(results) -> str:
     plans = [shown(main_results.scores(best_plan(results, env_id))) for env_id in WORLDS]
     text += f"| the best constant plan of each preference | | {' | '.join(plans)} |\n"
     for script in SIX:
-        of_worlds = [rows[env_id].get(script, []) for env_id in WORLDS]
+        of_worlds = [rows[env_id].get((script, ""), []) for env_id in WORLDS]
         seeds = " and ".join(dict.fromkeys(str(len(replicates)) for replicates in of_worlds if replicates))
         what = (seeds if script in methods.TRAINED else "") if seeds else "not run yet"
         fewest = 2 if script in methods.TRAINED else 1
@@ -78,36 +80,37 @@ def in_words(results) -> str:
 def paragraph(results, env_id: str) -> str:
     """What the main table says of one world; empty without trained methods or constant plans."""
     rows = default_rows(results, env_id)
-    scores = {script: main_results.scores(replicates) for script, replicates in rows.items()}
-    known = {script: its["score_greedy"] for script, its in scores.items() if not np.isnan(its["score_greedy"])}
-    trained = [script for script in known if script in methods.TRAINED]
-    if not trained or PLANTING not in known:
+    scores = {method: main_results.scores(replicates) for method, replicates in rows.items()}
+    known = {method: its["score_greedy"] for method, its in scores.items() if not np.isnan(its["score_greedy"])}
+    trained = [method for method in known if method[0] in methods.TRAINED]
+    planting = (PLANTING, "")
+    if not trained or planting not in known:
         return ""
     best = max(trained, key=known.__getitem__)
-    above = [script for script in trained if beats(rows[script], rows[PLANTING])]
-    beat = [script for script in trained if beats(rows[script], best_plan(results, env_id))]
+    above = [method for method in trained if beats(rows[method], rows[planting])]
+    beat = [method for method in trained if beats(rows[method], best_plan(results, env_id))]
     text = (
-        f"- **`{env_id}`.** Planting 100 stems a year without looking scores {known[PLANTING]:.0f}. The best of "
-        f"{len(trained)} trained method{'s' if len(trained) > 1 else ''} is {methods.title(best)} with "
+        f"- **`{env_id}`.** Planting 100 stems a year without looking scores {known[planting]:.0f}. The best of "
+        f"{len(trained)} trained method{'s' if len(trained) > 1 else ''} is {methods.title(*best)} with "
         f"{shown(scores[best])}, {of_seeds(rows[best])}; "
         f"by the whole interval of the difference on the same sites {named(above)} above planting, {named(beat)} above "
         "100."
     )
-    few = [script for script in trained if len(rows[script]) < FEWEST_SEEDS]
+    few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]
     if few:
-        text += f" Few training seeds: {listed([f'{methods.title(script)} {len(rows[script])}' for script in few])}."
-    lacking = [methods.title(script) for script in methods.LEARNERS if script not in known]
+        text += f" Few training seeds: {listed([f'{methods.title(*method)} {len(rows[method])}' for method in few])}."
+    lacking = [methods.title(script) for script in methods.LEARNERS if (script, "") not in known]
     text += f" Not run yet: {listed(lacking)}." if lacking else ""
     followed = {
-        script: main_results.row_of_runs((script, env_id, "default"), rows[script])
-        for script in trained
-        if script in methods.LEARNERS and len(rows[script]) >= FEWEST_SEEDS
+        method: main_results.row_of_runs((method[0], env_id, "default"), rows[method])
+        for method in trained
+        if method[0] in methods.LEARNERS and len(rows[method]) >= FEWEST_SEEDS
     }
     if not followed:
         text += f" Whether a method follows the preference is said from {FEWEST_SEEDS} training seeds on."
         return wrapped(text)
-    carbon = [script for script, row in followed.items() if row["carbon_change_low"] > 0.0]
-    thaw = [script for script, row in followed.items() if row["thaw_change_high"] < 0.0]
+    carbon = [method for method, row in followed.items() if row["carbon_change_low"] > 0.0]
+    thaw = [method for method, row in followed.items() if row["thaw_change_high"] < 0.0]
     text += (
         f" Asked for carbon instead of thaw, {named(carbon, 'store')} more carbon for it; asked for thaw instead of "
         f"carbon, {named(thaw, 'keep')} more cold in the ground (intervals over training seeds without 0)."
@@ -130,11 +133,11 @@ def listed(titles: list[str]) -> str:
     return titles[0] if len(titles) == 1 else ", ".join(titles[:-1]) + f" and {titles[-1]}"
 
 
-def named(scripts: list[str], verb: str = "") -> str:
-    """Titles of scripts as the subject of a sentence."""
-    if not scripts:
+def named(its_methods: list[tuple[str, str]], verb: str = "") -> str:
+    """Titles of methods as the subject of a sentence."""
+    if not its_methods:
         return "none " + (f"{verb}s" if verb else "is")
-    titles = [methods.title(script) for script in scripts]
+    titles = [methods.title(*method) for method in its_methods]
     words = listed(titles)
     plural = len(titles) > 1
     return f"{words} " + ((verb if plural else f"{verb}s") if verb else ("are" if plural else "is"))

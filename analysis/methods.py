@@ -54,6 +54,8 @@ ROWS = (
     Method("moea", "NSGA-II", POPULATION, "#56B4E9", "H"),
 )
 METHODS = {method.script: method for method in ROWS}
+BY_FLAGS = {("moea", "--algorithm moead"): "MOEA/D"}
+"""Flags that make another method of a script: (script, flags) -> its title."""
 
 
 def scripts(*kinds: str) -> tuple[str, ...]:
@@ -67,9 +69,9 @@ STRATEGIES = scripts(HEURISTIC, CONTROL)
 OUTSIDE = scripts(OTHERS)
 
 
-def title(script: str) -> str:
-    """A script's title; of one that is not in the registry, such as one's own, its name."""
-    return METHODS[script].title if script in METHODS else script
+def title(script: str, its_flags: str = "") -> str:
+    """A method's title, by its script and the flags that make another of it; of one's own script its name."""
+    return BY_FLAGS.get((script, its_flags)) or (METHODS[script].title if script in METHODS else script)
 
 
 def flags(setting: str) -> str:

@@ -10,7 +10,7 @@ from analysis import main_points
 from analysis.tables import main_results
 
 WORLD = main_points.WORLDS[0]
-SCORES = {"plus_100": 70.0, "eupg_var_lambda": 60.0, "ppo_gated": 80.0, "ppo_group": 110.0, "best": 100.0}
+SCORES = {"plus_100": 70.0, "eupg_var_lambda": 60.0, "ppo_gated": 80.0, "ppo_group": 110.0, "moea": 65.0, "best": 100.0}
 
 
 @pytest.fixture
@@ -20,6 +20,7 @@ def results(monkeypatch):
     rows |= {
         ("ppo_gated", WORLD, "ent_coef=0.0, vectorization=lockstep"): ["ppo_group"],
         ("ppo_curriculum", WORLD, "default"): [],
+        ("moea", WORLD, "algorithm=moead, vectorization=lockstep"): ["ppo_gated"],
     }
     changes = {"eupg_var_lambda": (-1.0, 1.0), "ppo_gated": (0.5, 0.1), "ppo_group": (0.5, -0.1)}
 
@@ -60,9 +61,10 @@ def test_the_score_of_a_single_training_is_not_shown(results):
 
 def test_the_words_follow_from_the_numbers(results):
     assert " ".join(main_points.in_words(results).split()) == (
-        "- **`boreal-balanced-v0`.** Planting 100 stems a year without looking scores 70. The best of 3 trained "
+        "- **`boreal-balanced-v0`.** Planting 100 stems a year without looking scores 70. The best of 5 trained "
         "methods is Group PPO with 110 [105, 115], 5 training seeds; by the whole interval of the difference on the "
-        "same sites PPO Gated and Group PPO are above planting, Group PPO is above 100. Not run yet: Curriculum PPO. "
+        "same sites PPO Gated, Group PPO and MOEA/D are above planting, Group PPO is above 100. Few training seeds: "
+        "MOEA/D 1. Not run yet: Curriculum PPO. "
         "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it; asked for thaw instead of "
         "carbon, Group PPO keeps more cold in the ground (intervals over training seeds without 0)."
     )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from analysis import same_physics
+from cleanrl_style import protocol
 from cleanrl_style.protocol import reference
 
 
@@ -58,6 +59,19 @@ def test_a_note_that_is_shipped_has_a_source_and_what_it_stands_for():
     for line in lines[1:]:
         source, stands_for, changed = line.split(",", 2)
         assert len(source) == len(stands_for) == 64 and source != stands_for and changed
+
+
+@pytest.mark.parametrize(
+    "path", sorted((Path(reference.__file__).parent / reference.FOLDER).iterdir()), ids=lambda p: p.name
+)
+def test_returns_that_ship_are_of_this_simulator(path):
+    """Else everybody's first evaluation would measure the constant plans anew, for minutes."""
+    _, physics = reference.read(path)
+    task = protocol.Task.of(path.name.removesuffix(".csv.gz"))
+    assert physics == reference.fingerprint(task), (
+        "simulator or environment were changed: analysis/same_physics.py if all numbers stay the same, else "
+        "analysis/reference_returns.py, and the archived runs are of another physics (CONTRIBUTING.md)"
+    )
 
 
 def test_a_digest_sees_the_last_bit():
