@@ -1,5 +1,8 @@
 """What each method does with the stands of the evaluation."""
 
+import numpy as np
+import pandas as pd
+
 from analysis.figures.common import (
     SEEDS_95,
     finish,
@@ -14,8 +17,8 @@ SIZE = (7, 5.2)
 MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
     f"Evaluation, means over the episodes and the weights 0, 0.5 and 1; {SEEDS_95}. (c) last year: median, and "
-    "80 % of the episodes, a cross a weight and seed. (d) all weights; eighths of the episodes by days above "
-    "5 °C."
+    "80 % of the episodes, medians over training seeds, larger with the weight of carbon; small: each seed. "
+    "(d) all weights; eighths of the episodes by days above 5 °C."
 )
 
 
@@ -32,14 +35,26 @@ def draw(figure, results) -> None:
             year_curve(ax, results.of("main", method.script), variable, method.colour, method.title)
         finish(ax, xlabel="year", ylabel=label)
     for method in learners(composition, results):
-        for one in results.of("main", method.script):
-            last = one.last_year.pivot(index="preference", columns="variable", values=["p10", "p50", "p90"])
-            x, y = last["p50"].density_stems_ha, last["p50"].conifer_fraction
-            spread = {
-                name: [last["p50"][column] - last["p10"][column], last["p90"][column] - last["p50"][column]]
-                for name, column in (("xerr", "density_stems_ha"), ("yerr", "conifer_fraction"))
-            }
-            composition.errorbar(x, y, **spread, fmt=method.marker, color=method.colour, linewidth=0.5, markersize=4)
+        runs = [
+            one.last_year.pivot(index="preference", columns="variable", values=["p10", "p50", "p90"])
+            for one in results.of("main", method.script)
+        ]
+        for seed in runs:
+            x, y = seed["p50"].density_stems_ha, seed["p50"].conifer_fraction
+            composition.scatter(x, y, s=4, marker=method.marker, color=method.colour, alpha=0.4, linewidth=0)
+        if runs:
+            whiskers(composition, pd.concat(runs).groupby("preference").median(), method)
     finish(composition, xlabel="stems/ha", ylabel="conifer fraction", ylim=(0, 1))
     season_curves(season, results)
     legend(figure, [species, season])
+
+
+def whiskers(ax, of_weights: pd.DataFrame, method) -> None:
+    """A method's density and species at each weight, the larger the more carbon counts, in the order of weights."""
+    x, y = (of_weights.xs(name, axis=1, level=1) for name in ("density_stems_ha", "conifer_fraction"))
+    ax.plot(x.p50, y.p50, color=method.colour, linewidth=1)
+    for size, weight in zip(np.linspace(3, 8, len(of_weights)), of_weights.index, strict=True):
+        low, median, high = ([x[q][weight], y[q][weight]] for q in ("p10", "p50", "p90"))
+        xerr, yerr = ([[m - a], [b - m]] for a, m, b in zip(low, median, high, strict=True))
+        style = {"fmt": method.marker, "color": method.colour, "linewidth": 0.8, "markersize": size}
+        ax.errorbar(*median, xerr=xerr, yerr=yerr, **style)

@@ -9,7 +9,7 @@ from analysis.validation.tower_comparison import QUANTITIES, scores
 
 PANELS = ("GPP", "ecosystem respiration", "net exchange", "latent heat", "sensible heat", "net radiation", "albedo")
 CARBON = "gC m$^{-2}$ day$^{-1}$"
-AXES = {"GPP": CARBON, "ecosystem respiration": CARBON, "net exchange": CARBON, "albedo": "1"}
+AXES = {"GPP": CARBON, "ecosystem respiration": CARBON, "net exchange": CARBON, "albedo": "share reflected"}
 
 
 @document.styled

@@ -445,7 +445,7 @@ def _in_half_hours(record, flags, choice: Choice, latitude_deg: float, cycle: Di
 def _site(record: pd.DataFrame, latitude_deg: float) -> dict[str, float]:
     """What the record tells of the site: latitude, and of whole years the mean and the first harmonic of the warmth."""
     site = {"latitude_deg": float(latitude_deg)}
-    days = record["air_temperature"].groupby(record.index.normalize()).mean()
+    days = record["air_temperature"].groupby(record.index.normalize()).mean().dropna()  # a year may lack 29 February
     if len(days) >= 365:
         angle = 2.0 * math.pi * (pd.DatetimeIndex(days.index).day_of_year.to_numpy() - 0.5) / 365.25
         anomaly = days.to_numpy() - days.mean()
