@@ -135,12 +135,15 @@ def test_killed_and_resumed_is_as_never_killed(script, common, moments, tmp_path
 
 @pytest.fixture(scope="module")
 def interrupted(tmp_path_factory):
-    """A run that Ctrl-C stopped, and what it said."""
+    """A run that Ctrl-C stopped, pressed twice, and what it said."""
     folder = tmp_path_factory.mktemp("runs") / "interrupted"
     process = start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_SECONDS="0.01")
     while process.poll() is None and not (folder / "checkpoint.pt").exists():
         time.sleep(0.005)
     os.killpg(process.pid, signal.SIGINT)
+    time.sleep(0.1)
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGINT)
     return folder, *finish(process)
 
 

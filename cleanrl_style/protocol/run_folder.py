@@ -1,5 +1,6 @@
 """A run's folder: configuration, tables, checkpoint and results, and what is said when a run stops early."""
 
+import atexit
 import contextlib
 import csv
 import hashlib
@@ -404,12 +405,14 @@ class Run:
         raise KeyboardInterrupt
 
     def __exit__(self, kind, error, trace) -> None:
-        for number, handler in self.handlers.items():
-            signal.signal(number, handler)
+        for number in self.handlers:  # a second Ctrl-C, too, waits until workers and files are closed
+            signal.signal(number, signal.SIG_IGN)
         dead = training_envs.end(self.envs) if self.envs is not None else []
         for table in self.tables.values():
             table.file.close()
         self.lock.close()
+        for number, handler in self.handlers.items():
+            signal.signal(number, handler)
         then = (
             f"the same command goes on from step {self.checkpoint_step:,}"
             if self.checkpoint_step
@@ -417,6 +420,7 @@ class Run:
         )
         if isinstance(error, KeyboardInterrupt):
             print(f"\n{self.folder}: interrupted; {then}", file=sys.stderr)
+            atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)  # before other libraries' last words
             sys.exit(130)
         if isinstance(error, (EOFError, ConnectionError)) and dead:
             fail(f"{'; '.join(dead)}; {then}")
