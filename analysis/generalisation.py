@@ -26,6 +26,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cleanrl_style.flags import require
+
+require("tyro")
+
 import numpy as np
 import pandas as pd
 import tyro
@@ -144,7 +148,8 @@ class Args:
     episodes: int = 50
     """the first sites of each split"""
     output: Path | None = None
-    """table of each policy, split and site (None: results/studies/generalisation/<environment>.csv)"""
+    """table of each policy, split and site (None: runs/generalisation/<environment>.csv, of archived runs
+    results/studies/generalisation/<environment>.csv)"""
 
 
 def task_of(config: dict) -> protocol.Task:
@@ -188,7 +193,10 @@ def evaluation_of(folder: Path, config: dict, task: protocol.Task, episodes: int
         found = run.tables["evaluation"]
         chosen = found[found.seed.isin(sites.evaluation_seeds(task, episodes))]
         if chosen.seed.nunique() < episodes:
-            raise ValueError(f"{folder}: it was evaluated on {chosen.seed.nunique()} of the {episodes} sites")
+            number = chosen.seed.nunique()
+            raise ValueError(
+                f"--episodes {episodes}: {folder} was evaluated on {number} of the sites; at most that is allowed"
+            )
         return chosen
     weights = config["arguments"]["eval_weights"]
     return protocol.evaluate(task, protocol.load_policy(folder), weights, episodes, split=split)[0]
@@ -253,7 +261,8 @@ def main(args: Args) -> None:
                 found[SEARCHED] = judged(evaluations, best[best.seed.isin(seeds)])
     except (ValueError, FileNotFoundError) as error:
         sys.exit(f"error: {error}")
-    path = path or paths.studies() / "generalisation" / f"{tasks[0].env_id}.csv"
+    archived = all(folder.resolve().is_relative_to(paths.archive().resolve()) for folder in configs)
+    path = path or (paths.studies() if archived else paths.runs()) / "generalisation" / f"{tasks[0].env_id}.csv"
     settings = {"runs": [str(folder) for folder in args.runs], "episodes": args.episodes, "splits": splits}
     scored = [[policy, split, round(score, 4)] for (policy, split), score in scores.items()]
     table = pd.concat([table.assign(split=split) for split, table in found.items()])

@@ -11,9 +11,11 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
+from cleanrl_style.flags import fail, parse, policy_file, require
 
-from cleanrl_style.flags import fail, parse, policy_file
+require("tyro")
+
+import tyro
 
 TASKS = ("boreal-generalist-v0", "boreal-balanced-v0")
 PAGE, TABLE = Path("docs", "leaderboard.md"), Path("docs", "leaderboard.csv")

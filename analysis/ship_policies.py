@@ -11,9 +11,13 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from cleanrl_style import flags
+
+flags.require("tyro")
+
 import tyro
 
-from cleanrl_style import flags, protocol
+from cleanrl_style import protocol
 
 LARGEST = 100_000  # bytes
 

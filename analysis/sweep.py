@@ -18,13 +18,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from cleanrl_style.flags import LIMITS, require
+
+require("tyro")
+
 import pandas as pd
 import tyro
 
 from analysis import archive, commands, paths, runs
 from analysis.tables.common import over_seeds, readable
 from cleanrl_style import protocol
-from cleanrl_style.flags import LIMITS
 from cleanrl_style.protocol import fronts
 from sim.block import LANES, lanes_for
 from sim.executor import HERE, RAY_HERE, NoCluster, check_address, default_address

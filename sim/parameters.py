@@ -86,7 +86,13 @@ ORDERED_CONSTANTS = (
     ("fire_kill_low", "fire_kill_high"),
     ("fire_organic_low", "fire_organic_high"),
     ("insect_lethal_c", "insect_mild_c"),
+    ("moss_water_held", "organic_porosity"),
+    ("humus_water_held", "organic_porosity"),
+    ("organic_conductivity_dry", "organic_conductivity_saturated"),
+    ("organic_conductivity_saturated", "organic_conductivity_saturated_frozen"),
 )
+
+WHOLE_CONSTANTS = ("young_age_limit", "mature_age_limit")
 
 _LATITUDE_SOUTH, _LATITUDE_RANGE = 56.0, 9.0
 _SITE_TEMPERATURE_SPREAD_C = 0.5
@@ -175,6 +181,8 @@ def check_constants(overrides: dict | None) -> dict[str, float]:
     values = {name: parameter.low for name, parameter in CONSTANTS.items()}
     for name, value in check_mapping("constants", overrides).items():
         values[name] = _check_number(name, value, _lookup(CONSTANTS, "constant", name))
+        if name in WHOLE_CONSTANTS and values[name] % 1:
+            raise ValueError(f"{name} = {values[name]:g}: a whole number is allowed")
     for low, high in ORDERED_CONSTANTS:
         if values[low] >= values[high]:
             raise ValueError(f"{low} = {values[low]:g} has to be less than {high} = {values[high]:g}")

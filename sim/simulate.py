@@ -7,6 +7,7 @@ from sim import stands
 from sim.draws import episode_seeds
 from sim.io.check import check_forcing, interval_of
 from sim.io.dataset import import_xarray, to_dataset
+from sim.io.disaggregation import climate_of
 from sim.jit import uncompiled
 from sim.management import NOTHING, as_array, check_actions, decode
 from sim.parameters import SITE_PARAMETERS, check_mapping, middle_site
@@ -30,6 +31,7 @@ HELD_STAND = {
     "fire_base_probability": 0.0,
     "insect_base_probability": 0.0,
 }
+CLIMATE = ("mean_annual_temperature_c", "seasonal_amplitude_c")
 NET_EXCHANGE = "nee_kgc_m2"
 #: Name -> (unit, meaning) of what the tables have beside the columns of `sim.state`.
 ADDED = {
@@ -67,7 +69,8 @@ def simulate(
     ----------
     site : dict of site parameters that differ from the middle of their ranges (any value inside the physical
         limits of `sim/site_parameters.csv`), or None. All of them, as `sim.sample_site` returns them, are a site too.
-        Latitude and climate are the forcing's, where `sim.read_forcing` made it and they are not given.
+        Latitude and climate are the forcing's, where they are not given; a frame that neither `sim.read_forcing` nor
+        `sim.half_hours` made does not know its latitude.
     actions : integer in [0, 25) for every year, or a sequence with one a year; None changes nothing.
     seed : of first state, weather and disturbances.
     years : years to run, at most 10,000; by default those of the forcing, or 50.
@@ -75,8 +78,9 @@ def simulate(
         DatetimeIndex of local solar time (start of the interval, from midnight) and the columns air_temperature_c
         [degC], relative_humidity [0-1, over water], wind_speed_m_s, shortwave_w_m2, longwave_w_m2 [W m-2],
         precipitation_mm [mm per interval]. Whole years of 365 days (29 February is dropped), repeated if there are
-        fewer than `years`; or, with years=1, whole days of a part of a year that starts on 1 January. Intervals finer
-        than the time step are averaged.
+        fewer than `years`; or, with years=1, whole days of a part of a year that starts on 1 January, whose ground is
+        spun up under generated weather of the site's mean_annual_temperature_c and seasonal_amplitude_c, which have to
+        be given. Intervals finer than the time step are averaged.
     initial : first stocks by name: density_stems_ha, conifer_fraction, biomass_kgc_m2, soil_kgc_m2,
         conifer_deadwood_kgc_m2, deciduous_deadwood_kgc_m2, hwp_kgc_m2, organic_layer_m, oldest_age_years, or stems by
         class (conifer_mature_stems_ha, ...); the rest is drawn, but for the stems' age, which follows from biomass and
@@ -85,7 +89,8 @@ def simulate(
         trees, soil carbon, dead wood and organic layer are those of the first. Dead wood is then none, unless given.
     lai : leaf area of the first stand in full leaf, per ground area [m2 m-2]; None leaves it to crowns and site.
     output : "annual" for one row a year (columns `sim.state.RECORD`), "daily" for one row a day (`sim.state.DAILY`),
-        "xarray" for a Dataset of both with names and units of ALMA and CF (`sim.io.dataset`; `.to_netcdf(file)`).
+        "xarray" for a Dataset of both with names and units of ALMA and CF (`sim.io.dataset`; `.to_netcdf(file)`). A
+        part of a year has no annual values.
     boundary : temperature far below: "sampled", the site's; "balanced", that at which no heat flows through it below
         the first stand; or a number [degC].
     scenario : climate change, see `sim.Stands`; not with `forcing`, which is weather of its own.
@@ -96,7 +101,7 @@ def simulate(
     -------
     pandas.DataFrame, indexed by `time` (start of the year or day: the forcing's, going on where it is repeated, or from
     2025 on; there is no 29 February), with a column `year` (from 0), daily `doy` (from 1), and `nee_kgc_m2`, net
-    exchange; `attrs["units"]` has each column's unit. Or an xarray.Dataset.
+    exchange. Fluxes are sums of the row's year or day; `attrs["units"]` has each column's unit. Or an xarray.Dataset.
 
     Raises
     ------
@@ -120,7 +125,7 @@ def simulate(
     given = as_array(NOTHING if actions is None else actions)
     per_year = np.full(years, given) if given.ndim == 0 else given
     check_actions(per_year, years, "years")
-    overrides, boundary = _with_boundary(_of_forcing(site, forcing), boundary)
+    overrides, boundary = _with_boundary(check_mapping("site parameters", site), boundary)
     if hold_stand:
         overrides |= HELD_STAND
     stand = Stands(
@@ -143,6 +148,9 @@ def simulate(
     observed, days = None, DAYS
     if forcing is not None:
         observed, days = check_forcing(forcing, time_step_minutes, years)
+        overrides = _of_forcing(overrides, forcing)
+    if days < DAYS:
+        _check_part(days, output, overrides)
     first_weather = None if observed is None else observed[0]
     place, seeds, stocks = middle_site(overrides), episode_seeds(seed), check_initial(initial)
     if lai is not None:
@@ -173,6 +181,8 @@ def simulate(
     about |= {"initial": stocks, "actions": per_year.tolist()}
     if forcing is not None:
         about["forcing"] = "; ".join(forcing.attrs.get("report", ["as given"]))
+    if days < DAYS:
+        annual = annual.iloc[:0, :1]
     return to_dataset(daily, annual, RECORD | DAILY | ADDED, stand.constants, boundary_c, about)
 
 
@@ -186,16 +196,29 @@ def _check_years(years, forcing, interval: int) -> int:
     return int(years)
 
 
-def _of_forcing(site, forcing) -> dict:
+def _of_forcing(given: dict, forcing: pd.DataFrame) -> dict:
     """The site's overrides, with what the forcing's record tells of it where they do not."""
-    given = check_mapping("site parameters", site)
-    told = {} if forcing is None else forcing.attrs.get("site", {})
+    told = forcing.attrs.get("site", {})
     name = "latitude_deg"
+    if name not in told and name not in given:
+        raise ValueError(f'{name} is needed: the forcing does not know its place; site={{"{name}": ..}} does')
     if name in told and isinstance(given.get(name), NUMBER) and abs(given[name] - told[name]) > 1.0:
         raise ValueError(
             f"{name} = {given[name]:g}: the forcing is of {told[name]:g}, and the sun has to be that of its place"
         )
-    return {**told, **given}
+    return {**climate_of(forcing["air_temperature_c"]), **told, **given}
+
+
+def _check_part(days: int, output: str, overrides: dict) -> None:
+    """Refuse what a part of a year does not have: annual values, and a climate."""
+    lacking = [name for name in CLIMATE if name not in overrides]
+    if lacking:
+        raise ValueError(
+            f"forcing: {days} days are no whole year, so the ground is spun up under the site's climate; "
+            f"site= needs {' and '.join(lacking)}"
+        )
+    if output == "annual":
+        raise ValueError(f'output "annual": {days} days of forcing are no whole year; "daily" and "xarray" are allowed')
 
 
 def _with_boundary(site: dict, boundary) -> tuple[dict, object]:

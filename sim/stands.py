@@ -61,6 +61,7 @@ ARRAYS = ("parameters", "state", "record", "years")  # of what a state saves
 SAVED = (*ARRAYS, "seeds", "weather", "disturbance")  # that the future depends on
 LONGEST_STEP_MINUTES = 120  # beyond, the air is up to 2 K too warm
 MOST_THREADS = 10_000  # so that a mistake of a thousandfold is named
+MOST_STANDS = 10_000_000  # of 5 kB each
 
 
 class Stands:
@@ -104,6 +105,8 @@ class Stands:
         threads=None,
     ):
         self.number = positive_integer("number of stands", number)
+        if self.number > MOST_STANDS:
+            raise ValueError(f"number of stands: at most {MOST_STANDS:,} are allowed at once, got {self.number:,}")
         minutes = positive_integer("time_step_minutes", time_step_minutes)
         if 1440 % minutes or minutes > LONGEST_STEP_MINUTES:
             raise ValueError(

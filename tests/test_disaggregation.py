@@ -108,7 +108,9 @@ def test_days_in_the_columns_of_a_forcing_are_simulated_as_its_error_advises(dai
     forcing = daily.drop(columns="vapour_pressure_deficit_hpa").assign(relative_humidity=0.8)
     with pytest.raises(ValueError, match=r"sim.half_hours\(forcing, latitude_deg\) makes half-hours of it"):
         sim.simulate(forcing=forcing)
-    table = sim.simulate({"latitude_deg": LATITUDE}, forcing=sim.half_hours(forcing, LATITUDE), time_step_minutes=120)
+    half_hours = sim.half_hours(forcing, LATITUDE)
+    assert half_hours.attrs["site"]["latitude_deg"] == LATITUDE
+    table = sim.simulate(forcing=half_hours, time_step_minutes=120)
     assert table.precipitation_mm.tolist() == pytest.approx([forcing.precipitation_mm.drop("2012-02-29").sum()])
 
 

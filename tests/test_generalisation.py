@@ -166,13 +166,14 @@ def run(tmp_path, monkeypatch):
     monkeypatch.setattr(protocol, "load_policy", lambda folder: None)
     monkeypatch.setattr(generalisation.reference, "reference_returns", plans)
     monkeypatch.setattr(generalisation.open_loop, "fingerprint", lambda: "physics")
-    monkeypatch.setattr(paths, "studies", lambda: tmp_path / "studies")
+    for name in ("studies", "runs", "archive"):
+        monkeypatch.setattr(paths, name, lambda name=name: tmp_path / name)
     return folder, played
 
 
 def judge(folder, **arguments):
     generalisation.main(generalisation.Args(runs=(folder,), episodes=2, **arguments))
-    output = folder.parent / "studies" / "generalisation" / "boreal-balanced-v0.csv"
+    output = folder.parent / "runs" / "generalisation" / "boreal-balanced-v0.csv"
     return stored.read(output).groupby(["split", "policy"])[list(generalisation.RATIOS)].mean()
 
 
@@ -191,6 +192,14 @@ def test_a_run_is_judged_inside_and_outside(run, capsys):
     out = capsys.readouterr().out
     assert "python analysis/best_plans.py` makes it" in out
     assert "     2     50" in out and "     2     25" in out and "+0.25" in out
+
+
+def test_ratios_of_archived_runs_lie_by_the_other_studies(run, tmp_path):
+    folder, _ = run
+    archived = folder.rename(tmp_path / "archive")
+    generalisation.main(generalisation.Args(runs=(archived,), episodes=2, split=("calmer",)))
+    assert (tmp_path / "studies" / "generalisation" / "boreal-balanced-v0.csv").exists()
+    assert not (tmp_path / "runs").exists()
 
 
 def test_a_run_of_another_physics_is_named(run, capsys):
@@ -224,7 +233,7 @@ def test_a_split_or_a_run_that_is_not_there(run, tmp_path):
         SystemExit, match="--split hotter: allowed are test, validation, training, warmer_air, .*, outside"
     ):
         judge(folder, split=("hotter",))
-    with pytest.raises(SystemExit, match="it was evaluated on 2 of the 3 sites"):
+    with pytest.raises(SystemExit, match="--episodes 3: .* was evaluated on 2 of the sites"):
         generalisation.main(generalisation.Args(runs=(folder,), episodes=3))
     with pytest.raises(SystemExit, match="--episodes 0: 1 or more are allowed"):
         generalisation.main(generalisation.Args(runs=(folder,), episodes=0))

@@ -334,6 +334,10 @@ def test_a_grid_beyond_its_climate():
 
 
 def test_where_no_store_can_be(tmp_path):
+    with pytest.raises(ValueError, match="path 5: the name of a folder is allowed"):
+        sim.simulate_many(table(2), 12, years=1, path=5)
+    with pytest.raises(ValueError, match=r"path .*x.nc: a zarr store is written"):
+        sim.simulate_many(table(2), 12, years=1, path=tmp_path / "x.nc")
     with pytest.raises(ValueError, match="path '': the name of a folder is allowed"):
         sim.simulate_many(table(2), 12, years=1, path="")
     (tmp_path / "file").touch()

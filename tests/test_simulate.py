@@ -51,7 +51,9 @@ def observed(days=365, minutes=240, start="2019-01-01", **columns):
         "longwave_w_m2": 260.0 + 60.0 * summer,
         "precipitation_mm": 0.25,
     }
-    return pd.DataFrame({**values, **columns}, index=index)
+    table = pd.DataFrame({**values, **columns}, index=index)
+    table.attrs["site"] = {"latitude_deg": 60.5, "mean_annual_temperature_c": -3.0, "seasonal_amplitude_c": 17.0}
+    return table
 
 
 # --------------------------------------------------------------------------------------------------- the table
@@ -430,6 +432,28 @@ def test_a_part_of_a_year_is_run_as_such():
     part = simulate(forcing=observed(90), output="daily")
     assert part.doy.tolist() == list(range(1, 91))
     assert part.precipitation_mm.sum() == pytest.approx(0.25 * 6 * 90)
+    with pytest.raises(ValueError, match='output "annual": 90 days of forcing are no whole year'):
+        simulate(forcing=observed(90))
+
+
+@pytest.mark.parametrize("climate", ["mean_annual_temperature_c", "seasonal_amplitude_c"])
+def test_the_climate_of_a_part_of_a_year_is_asked_for(climate):
+    part = observed(90)
+    value = part.attrs["site"].pop(climate)
+    with pytest.raises(ValueError, match=f"90 days are no whole year.* site= needs {climate}$"):
+        simulate(forcing=part, output="daily")
+    pd.testing.assert_frame_equal(
+        simulate({climate: value}, forcing=part, output="daily"), simulate(forcing=observed(90), output="daily")
+    )
+
+
+def test_a_forcing_that_lost_its_site_knows_its_climate_but_no_place():
+    lost = observed()
+    told = lost.attrs.pop("site")
+    with pytest.raises(ValueError, match="latitude_deg is needed"):
+        simulate(forcing=lost)
+    place = {"latitude_deg": told["latitude_deg"]}
+    np.testing.assert_allclose(simulate(place, forcing=lost), simulate(place, forcing=observed()), rtol=0.02, atol=0.02)
 
 
 def test_air_without_wind_at_the_melting_point_is_allowed():
@@ -592,8 +616,9 @@ def test_latitude_and_climate_are_the_forcings_where_they_are_not_given():
     forcing.attrs["site"] = {"latitude_deg": 66.0, "mean_annual_temperature_c": -3.0}
     told = simulate(forcing=forcing)
     plain = observed()
-    pd.testing.assert_frame_equal(told, simulate(forcing.attrs["site"], forcing=plain))
     assert not told.equals(simulate(forcing=plain))
+    plain.attrs.clear()
+    pd.testing.assert_frame_equal(told, simulate(forcing.attrs["site"], forcing=plain))
     assert not told.equals(simulate({"mean_annual_temperature_c": -9.0}, forcing=forcing))
     with pytest.raises(
         ValueError, match=r"latitude_deg = 60: the forcing is of 66, and the sun has to be that of its place"
@@ -657,6 +682,11 @@ BAD = {
     "action of text": ({"actions": "plant"}, r"integers in \[0, 25\)"),
     "too many actions": ({"actions": [12, 12]}, r"actions of shape \(2,\): one integer for each of 1 years is allowed"),
     "years 0": ({"years": 0}, r"years: a positive integer is allowed, got 0"),
+    "more water than pores": (
+        {"constants": {"moss_water_held": 0.6, "organic_porosity": 0.5}},
+        r"moss_water_held = 0.6 has to be less than organic_porosity = 0.5",
+    ),
+    "half a year of age": ({"constants": {"mature_age_limit": 61.5}}, r"mature_age_limit = 61.5: a whole number"),
     "years without end": ({"years": 10**9}, r"years = 1000000000: at most 10000 are allowed"),
     "years of float": ({"years": 2.0}, r"years: a positive integer is allowed, got 2.0"),
     "seed -1": ({"seed": -1}, r"seed.*-1"),
@@ -721,6 +751,18 @@ def test_bad_input_is_refused_with_the_value_and_what_is_allowed(arguments, mess
     with pytest.raises(ValueError, match=message) as refusal:
         simulate(**arguments)
     assert "\n" not in str(refusal.value)
+
+
+def test_more_stands_than_any_memory_holds_are_refused():
+    with pytest.raises(ValueError, match="at most 10,000,000 are allowed at once, got 1,000,000,000,000"):
+        sim.Stands(10**12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("biomass", [0.5, 5.0, 20.0])
+def test_stems_that_are_drawn_hold_the_biomass_that_is_given(seed, biomass):
+    first = simulate(seed=seed, initial={"biomass_kgc_m2": biomass}, hold_stand=True)
+    assert first.biomass_kgc_m2[0] / first.density_stems_ha[0] * 1e4 < 1.1 * spin_up.LARGEST_STEM_KGC
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, True, None])

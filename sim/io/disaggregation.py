@@ -13,7 +13,7 @@ import pandas as pd
 
 from sim.jit import uncompiled
 from sim.parameters import SITE_PARAMETERS
-from sim.state import FORCING
+from sim.state import DAYS, FORCING
 from sim.weather import saturation_pressure_water, solar_declination
 
 saturation_water = uncompiled(saturation_pressure_water)
@@ -62,6 +62,7 @@ def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = F
     Shortwave of a day whose sun does not rise is spread evenly, so that the mean stays. Relative humidity is over
     water and at most 1: vapour beyond that, on cold nights, is dew. Raises ValueError, naming column and day, for a
     gap, and for a deficit larger than the day's saturation pressure; and for what is no daily table of a place.
+    `attrs["site"]` has what the days tell of the site, for `sim.simulate`.
     """
     columns = _check_daily(daily, latitude_deg)
     daily = daily[columns]
@@ -99,7 +100,19 @@ def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = F
     }
     steps = pd.to_timedelta(np.arange(STEPS_PER_DAY) * 24.0 / STEPS_PER_DAY, unit="h")
     index = pd.DatetimeIndex(np.concatenate([day + steps for day in daily.index]), name="time")
-    return pd.DataFrame({name: one.ravel() for name, one in values.items()}, index=index)
+    forcing = pd.DataFrame({name: one.ravel() for name, one in values.items()}, index=index)
+    forcing.attrs["site"] = {"latitude_deg": float(latitude_deg), **climate_of(daily["air_temperature_c"])}
+    return forcing
+
+
+def climate_of(air_temperature_c: pd.Series) -> dict[str, float]:
+    """Site parameters of a record's warmth, indexed by time: its mean and first harmonic; none of less than a year."""
+    days = air_temperature_c.groupby(air_temperature_c.index.normalize()).mean().dropna()  # it may lack 29 February
+    if len(days) < DAYS:
+        return {}
+    angle = 2.0 * math.pi * (pd.DatetimeIndex(days.index).day_of_year.to_numpy() - 0.5) / 365.25
+    wave = [2.0 * ((days - days.mean()).to_numpy() * shape(angle)).mean() for shape in (np.cos, np.sin)]
+    return {"mean_annual_temperature_c": float(days.mean()), "seasonal_amplitude_c": float(math.hypot(*wave))}
 
 
 def _check_daily(daily, latitude_deg) -> list[str]:

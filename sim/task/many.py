@@ -452,8 +452,12 @@ class Store:
     """
 
     def __init__(self, path, plan: Plan, label: str, overwrite: bool):
-        if path is not None and not Path(path).name:
+        if path is not None and not (isinstance(path, (str, os.PathLike)) and Path(path).name):
             raise ValueError(f"path {path!r}: the name of a folder is allowed")
+        if path is not None and Path(path).suffix in (".nc", ".csv"):
+            raise ValueError(
+                f"path {path}: a zarr store is written, such as region.zarr; `.to_netcdf` makes NetCDF of it"
+            )
         self.plan = plan
         self.settings = {
             "simulator": simulator(),
