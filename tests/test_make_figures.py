@@ -5,7 +5,14 @@ from matplotlib.figure import Figure
 from tiny_runs import TINY_RUNS, write_run, write_run_of_three
 
 from analysis import experiments, make_figures, make_tables, methods
-from analysis.figures import algorithm_comparison, common, many_objectives, training_dynamics
+from analysis.figures import (
+    algorithm_comparison,
+    common,
+    learning_difficulty,
+    many_objectives,
+    site_influence,
+    training_dynamics,
+)
 from analysis.figures.common import no_data
 from analysis.results import Results
 
@@ -64,6 +71,9 @@ def test_what_is_drawn_is_what_the_runs_hold(figures):
     assert carbon.get_xdata().tolist() == [0, 0.5, 1] and carbon.get_ydata() == pytest.approx([0, 1, 2])
     density = lettered(figures["strategies"])["b"].lines[0]
     assert density.get_ydata() == pytest.approx([400, 1200])
+    ages = lettered(figures["demographics"])["g"]
+    assert [label.get_text() for label in ages.get_yticklabels()] == ["0", "0.5", "1"]
+    assert len(ages.lines) == 3 * 3  # a weight: seeds, line, median
     learning = lettered(figures["individual_objectives"])["a"].lines[0]
     assert learning.get_ydata() == pytest.approx([0, 1, 2, 3])
     assert learning.get_xdata() == pytest.approx(np.array([75, 150, 225, 300]) - 3.75)
@@ -119,6 +129,8 @@ def test_three_objectives_have_a_figure_of_their_own(tmp_path, monkeypatch):
     results = Results((tmp_path / "runs",), experiments.jobs(), TINY_RUNS / "no studies")
     figure = Figure()
     many_objectives.figures(results)["many_objectives_timber-v0"][1](figure)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels[-1] == "fixed strategy, which does not look at the weight"
     lines, *triangles = figure.get_axes()[:4]
     curves = [line for line in lines.lines if len(line.get_xdata()) == 3]
     assert len(curves) == 4  # three weights, and zero change, which looks at none
@@ -133,6 +145,27 @@ def test_three_objectives_have_a_figure_of_their_own(tmp_path, monkeypatch):
         corner = points.get_offsets()[np.argmax(points.get_array())]
         np.testing.assert_allclose(corner, [[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]][k], atol=1e-12)
     assert not many_objectives.figures(Results((TINY_RUNS,), experiments.jobs(), TINY_RUNS / "no studies"))
+
+
+def test_no_fixed_strategy_no_dashed_line(tmp_path):
+    write_run_of_three(tmp_path / "ours", "ppo_gated", np.eye(3), 1)
+    figure = Figure()
+    many_objectives.figures(Results((tmp_path,), experiments.jobs(), tmp_path))["many_objectives_timber-v0"][1](figure)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["carbon", "thaw", "timber", "shared"]
+    assert "dashed" not in many_objectives.CAPTION
+
+
+def test_sites_differ_more_than_methods():
+    ax = Figure().subplots()
+    site_influence.draw_sites(ax, pd.DataFrame({"one": [0.0, -20.0], "other": [2.0, -18.0]}, index=[1, 2]))
+    assert words(ax) == "sd between sites: 14.1 sd between methods on a site: 1.4"
+    assert ax.lines[0].get_ydata().tolist() == [1.0, -19.0]
+    assert [segment[:, 1].tolist() for segment in ax.collections[0].get_segments()] == [[0.0, 2.0], [-20.0, -18.0]]
+
+
+def test_marks_lie_within_their_axis():
+    assert learning_difficulty.around(np.array([0.0, 3.0, 60.0, np.inf]), 2.0, 100.0) == (1.0, 120.0)
+    assert learning_difficulty.around(np.array([50.0]), 2.0, 100.0) == (2.0, 100.0)
 
 
 def test_without_runs_it_names_a_command(tmp_path):

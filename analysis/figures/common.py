@@ -185,6 +185,10 @@ def season_curves(ax, results) -> None:
     """Growing season against thaw return for every method."""
     for method in learners(ax, results):
         band(ax, *by_season(results.of("main", method.script)), method.colour, method.title, marker=method.marker)
+    curves = [line.get_ydata() for line in ax.lines]
+    if len(curves) > 1 and len({len(curve) for curve in curves}) == 1:
+        note = f"methods differ by at most {np.ptp(curves, axis=0).max():.1f}"
+        ax.text(0.98, 0.98, note, transform=ax.transAxes, ha="right", va="top", fontsize=7)
     finish(ax, xlabel="days above 5 °C", ylabel="thaw return (50 years)")
 
 

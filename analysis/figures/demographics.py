@@ -4,14 +4,15 @@ import numpy as np
 import pandas as pd
 
 from analysis.figures.common import SEEDS_95, finish, learners, legend, letter, year_curve
+from analysis.methods import LEARNERS
 from analysis.reduction import BINS
 
 SIZE = (7, 7)
 MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
     f"(a-e) evaluation, mean over the weights 0, 0.5 and 1; solid: conifers, dashed: deciduous; {SEEDS_95}. "
-    "(f) last fifth of the training episodes of all seeds. (g) last year: median and 80 % of the episodes, a "
-    "line a weight and seed."
+    "(f) last fifth of the training episodes of all seeds. (g) last year: median and 80 % of the episodes, "
+    "medians over training seeds; small: each seed's median."
 )
 CLASSES = {
     "seedling": "seedlings, 0-5 years",
@@ -20,6 +21,7 @@ CLASSES = {
     "mature": "mature, 41-100",
     "old": "old, 101+",
 }
+GROUP = 0.7  # height of a weight's lines, of the distance between two weights
 
 
 def draw(figure, results) -> None:
@@ -47,15 +49,16 @@ def draw(figure, results) -> None:
         number = {"weights": stands.episodes, "density": True}
         training.hist(middles, edges, **number, histtype="step", color=method.colour)
     finish(training, xlabel="conifer fraction after 50 years", ylabel="density of episodes")
-    height = 0
-    for method in learners(evaluation, results):
-        for one in results.of("main", method.script):
-            last = one.last_year[one.last_year.variable == "conifer_fraction"]
-            for row in last.sort_values("preference").itertuples():
-                evaluation.plot([row.p10, row.p90], [height, height], color=method.colour, linewidth=1)
-                evaluation.plot(row.p50, height, "|", color=method.colour, markersize=4)
-                height -= 1
-        height -= 2
-    finish(evaluation, xlabel="conifer fraction after 50 years", xlim=(0, 1))
-    evaluation.set_yticks([])
+    for k, method in enumerate(learners(evaluation, results)):
+        rows = pd.concat([one.last_year for one in results.of("main", method.script)])
+        rows = rows[rows.variable == "conifer_fraction"]
+        of_weights = list(rows.groupby("preference"))
+        for place, (_, of_seeds) in enumerate(of_weights):
+            height = place + GROUP * ((len(LEARNERS) - 1) / 2 - k) / len(LEARNERS)
+            evaluation.plot(of_seeds.p50, [height] * len(of_seeds), "o", color=method.colour, markersize=2, alpha=0.5)
+            low, median, high = of_seeds[["p10", "p50", "p90"]].median()
+            evaluation.plot([low, high], [height, height], color=method.colour, linewidth=1.3)
+            evaluation.plot(median, height, "|", color=method.colour, markersize=7, markeredgewidth=1.5)
+        evaluation.set_yticks(range(len(of_weights)), [f"{weight:g}" for weight, _ in of_weights])
+    finish(evaluation, xlabel="conifer fraction after 50 years", ylabel="weight of carbon", xlim=(0, 1))
     legend(free, axes[:1], "center", 1)

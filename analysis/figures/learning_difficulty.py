@@ -12,8 +12,9 @@ SIZE = (7, 5.8)
 MADE_BY = "python analysis/studies/variance.py && python analysis/reproduce.py --only difficulty"
 CAPTION = (
     f"(b)-(d) one action in year {YEAR} under uniformly random valid actions, the same sites and weathers with either "
-    "action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside. (b, d) what lies beyond an axis is not "
-    "drawn. (d) half of the episodes have either action; dashed line: those of a training run."
+    "action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside; an interval to the left edge reaches 0. "
+    "(d) half of the episodes have either action; dashed line: those of a training run; an interval to the right edge "
+    "has no end."
 )
 COMPONENTS = {
     "site": "#0072B2",
@@ -82,14 +83,22 @@ def rows_of(ax) -> list[tuple[str, str]]:
     return rows
 
 
+def around(values, low: float, high: float) -> tuple[float, float]:
+    """Limits of a logarithmic axis that all values lie well within, at least low to high."""
+    known = values[np.isfinite(values) & (values > 0)]
+    return min(low, known.min() / 3), max(high, 2 * known.max())
+
+
 def draw_noise(ax, cases) -> None:
     """Size of the effect with its interval, and the noise with and without the site's mean taken off."""
     rows = rows_of(ax)
+    shown = cases.loc[rows]
+    limits = around(np.concatenate([shown.effect.abs(), shown.noise, shown.site_noise]), 1e-3, 40)
     for k, row in enumerate(rows):
         case, (colour, marker) = cases.loc[row], OF[row[1]]
         ends = np.sort(np.sign(case.effect) * np.array([case.effect_low, case.effect_high]))
         # an interval that reaches 0 has no lower end on a logarithmic axis
-        ax.plot(np.maximum(ends, 1e-3), [k, k], color=colour, linewidth=1.5)
+        ax.plot(np.maximum(ends, limits[0]), [k, k], color=colour, linewidth=1.5)
         ax.plot(abs(case.effect), k, marker, color=colour, markersize=5, label="effect" if k == 0 else None)
         for column, symbol, label in (("site_noise", "<", "site baseline"), ("noise", "x", "no baseline")):
             ax.plot(
@@ -101,7 +110,7 @@ def draw_noise(ax, cases) -> None:
                 markerfacecolor="none",
                 label=f"noise, {label}" if k == 0 else None,
             )
-    ax.set_xlim(1e-3, 40)
+    ax.set_xlim(limits)
     ax.set_xlabel("return to go")
     ax.legend(ncol=3, loc="upper center", bbox_to_anchor=(0.2, -0.2), fontsize=6)
 
@@ -135,10 +144,12 @@ def draw_needed(ax, cases) -> None:
         ("return", "site_episodes", "o", "site baseline"),
         ("GAE", "site_episodes", "D", "site baseline, GAE"),
     )
+    marks = [case for weighting, column, *_ in kinds for case in cases.loc[weighting].loc[rows, column]]
+    limits = around(np.array(marks), 30, 1e9)
     for weighting, column, symbol, label in kinds:
         for k, row in enumerate(rows):
             case = cases.loc[(weighting, *row)]
-            most = min(case[f"{column}_high"], 1e10)
+            most = min(case[f"{column}_high"], limits[1])
             shift = 0.2 * (kinds.index((weighting, column, symbol, label)) - 1)
             ax.plot([case[f"{column}_low"], most], [k + shift] * 2, color=OF[row[1]][0], linewidth=1)
             ax.plot(
@@ -151,6 +162,6 @@ def draw_needed(ax, cases) -> None:
                 label=label if k == 0 else None,
             )
     ax.axvline(TRAINING_EPISODES, linestyle="--", color="black", linewidth=0.8)
-    ax.set_xlim(30, 1e9)
+    ax.set_xlim(limits)
     ax.set_xlabel("episodes")
     ax.legend(ncol=3, loc="upper center", bbox_to_anchor=(0.2, -0.2), fontsize=6)

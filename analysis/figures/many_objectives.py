@@ -17,8 +17,8 @@ from analysis.tables.many_objectives import file_stem
 COLOURS = ("#009e73", "#0072b2", "#d55e00", "#cc79a7", "#e69f00")  # of the objectives
 EQUAL, REFERENCE = "#999999", "black"
 CAPTION = (
-    "Evaluation: mean returns over episodes and seeds at each weight. Lines have the colour of the objective with the "
-    "largest weight, grey where several share it; dashed: methods that do not look at the weight."
+    "Evaluation: mean returns over episodes and seeds at each weight. A line has the colour of the largest weight's "
+    "objective, grey where several share it."
 )
 
 STEM = "many_objectives"
@@ -56,7 +56,7 @@ def drawn(objectives, followers, fixed):
             for k, ax in enumerate(row[1:]):
                 triangle = ternary_diagram(ax, table, objectives, k, (low[k], high[k]))
                 figure.colorbar(triangle, ax=ax, shrink=0.7, label=f"{objectives[k]} return")
-        names = [*objectives, "shared", *(["fixed strategy"] if references else [])]
+        names = [*objectives, "shared", *(["fixed strategy, which does not look at the weight"] if references else [])]
         looks = [(colour, "-") for colour in COLOURS[: len(objectives)]] + [(EQUAL, "-"), (REFERENCE, "--")]
         handles = [Line2D([], [], color=colour, linestyle=style) for colour, style in looks[: len(names)]]
         figure.legend(handles, names, loc="outside upper center", ncols=3)

@@ -171,7 +171,7 @@ def title(table: pd.DataFrame, settings: dict) -> str:
 
 PANELS = (
     ("planted_stems_ha_yr", "planted, stems/ha a year", "YlGn", False),
-    ("conifer_share", "conifers among the planted", "BrBG", False),
+    ("conifer_share", "conifers, share of the planted", "BrBG", False),
     ("thaw_depth_change_m", "thaw depth, m against doing nothing", "RdBu_r", True),
     ("carbon_change_kgc_m2", "carbon, kgC/m2 against doing nothing", "PuOr_r", True),
 )

@@ -74,11 +74,11 @@ def draw(front: pd.DataFrame, choices: dict[str, np.ndarray], title: str) -> Fig
     )
     for row in front.itertuples():
         left.annotate(
-            reference.title(row.plan).rpartition(", ")[2], (row.carbon_gain, row.thaw_gain), xytext=(6, 4), **SMALL
+            reference.title(row.plan).rpartition(", ")[2], (row.carbon_gain, row.thaw_gain), xytext=(-8, -3), **SMALL
         )
     left.set(xlabel="carbon gain", ylabel="thaw gain", title="plans that no other dominates")
-    left.margins(x=0.35, y=0.15)
-    left.legend(fontsize=7, loc="lower left")
+    left.margins(x=0.45, y=0.15)
+    left.legend(fontsize=7, loc="upper right")
     for (name, chosen), style in zip(choices.items(), ("k-", "C1-"), strict=True):
         right.step(WEIGHTS, front.carbon_gain.to_numpy()[chosen], style, where="mid", label=NAMES[name])
     right.set(xlabel="carbon weight", ylabel="carbon gain", title="the best plan of each preference")
@@ -86,7 +86,7 @@ def draw(front: pd.DataFrame, choices: dict[str, np.ndarray], title: str) -> Fig
     return figure
 
 
-SMALL = {"textcoords": "offset points", "fontsize": 7}
+SMALL = {"textcoords": "offset points", "fontsize": 7, "ha": "right", "va": "top"}
 NAMES = {"linear": "weighted sum", "chebyshev": "Chebyshev's utility"}
 
 

@@ -390,15 +390,20 @@ def draw(plans: pd.DataFrame, years: pd.DataFrame, path: Path) -> None:
         means = plans[plans.scenario == scenario].groupby("action")[open_loop.RETURNS].mean()
         left.scatter(*means.to_numpy().T, s=8, color=colours[scenario], alpha=0.35, linewidths=0)
         left.plot(front.carbon_return, front.thaw_return, "o-", ms=4, color=colours[scenario], label=scenario)
+    left.scatter([], [], s=8, color=colours[NONE], alpha=0.35, linewidths=0, label="plans off the front")
     left.set(
         xlabel="carbon return", ylabel="thaw return", title="Constant plans: mean returns of 50 years, front joined"
     )
     left.legend(frameon=False)
-    for scenario in SCENARIOS:
+    for scenario in reversed(SCENARIOS):  # the one that warms least on top: it is hidden below no other
         rows = years[years.scenario == scenario]
         for column, style in (("frozen_any_plan", "-"), ("frozen_unchanged", "--")):
-            of_ten = rows[["warming_k", column]].rolling(LAST).mean()
+            of_ten = rows[["warming_k", column]].rolling(LAST).mean().dropna()
             right.plot(of_ten.warming_k, 100 * of_ten[column], style, color=colours[scenario], lw=1.5)
+            right.plot(of_ten.warming_k.tail(1), 100 * of_ten[column].tail(1), "o", ms=4, color=colours[scenario])
+    for scenario in SCENARIOS:
+        end = years[years.scenario == scenario].warming_k.tail(LAST).mean()
+        right.plot([], [], "o-", ms=4, color=colours[scenario], label=f"{scenario}, ends at {end:.1f} K")
     right.plot([], [], "-", color="#333333", label="under some plan")
     right.plot([], [], "--", color="#333333", label="without management")
     right.set(ylim=(0, 103), xlabel="warming, mean of ten years [K]", ylabel="frozen in the upper 3 m [%]")

@@ -8,7 +8,7 @@ import pandas as pd
 
 from analysis.validation import calibration, climate_records, document, forest_towers
 from analysis.validation.climate_records import SEASONS, Climate
-from analysis.validation.document import BLACK, BLUE, GREEN, ORANGE, Miss, Part, number
+from analysis.validation.document import BLACK, BLUE, GREEN, ORANGE, PURPLE, Miss, Part, number
 from analysis.validation.held_stands import KINDS, MONTH, Run, hold
 from sim.parameters import CONSTANTS, WEATHERS
 from sim.physical_constants import MJ_PER_DAY
@@ -63,6 +63,9 @@ STATISTICS = {
     ),
     "shortwave": Statistic("shortwave", "W m-2", 0.15, True, "clearness by season", 0),
 }
+
+#: Labels of the figure's axes where the unit is 1.
+AXES = {"persistence": "correlation", "wet days": "share of the days"}
 
 
 def of_days(temperature: np.ndarray, precipitation: np.ndarray, shortwave: np.ndarray) -> dict[str, np.ndarray]:
@@ -172,7 +175,7 @@ The paper's parameter ranges force most of what differs: mean annual temperature
 ### Calibration and its stability
 
 {calibrated}"""
-    return Part(text, {"validation_weather.png": draw(here, there, towers)}, [*misses, *more])
+    return Part(text, {"validation_weather.png": draw(here, there, as_observed, towers)}, [*misses, *more])
 
 
 def _table(here, there, as_observed, towers, forests) -> tuple[list[list[str]], list[Miss]]:
@@ -249,21 +252,24 @@ def _lag_one(anomaly: np.ndarray) -> float:
 
 
 @document.styled
-def draw(here: dict, there: dict, towers: dict) -> bytes:
-    """PNG: monthly statistics of the generator on sampled sites, in US-Prr's climate, and of the records."""
+def draw(here: dict, there: dict, as_observed: dict, towers: dict) -> bytes:
+    """PNG: monthly statistics of the generator on sampled sites, in US-Prr's climate with either weather, and of the
+    records."""
     figure = document.new_figure(8.5, 9.0)
     month = np.arange(1, 13)
     axes = figure.subplots(4, 2).ravel()
     for ax, (name, statistic) in zip(axes, STATISTICS.items(), strict=False):
         low, median, high = np.percentile(here[name], [10, 50, 90], axis=0)
-        ax.fill_between(month, low, high, color=BLUE, alpha=0.2, lw=0, label="generator, sampled sites: 10-90 %")
-        ax.plot(month, median, color=BLUE, lw=1.3, label="generator, sampled sites: median")
-        ax.plot(month, np.nanmedian(there[name], axis=0), color=ORANGE, lw=1.5, label="generator, US-Prr's climate")
+        ax.fill_between(month, low, high, color=BLUE, alpha=0.2, lw=0, label='weather "paper", sampled sites: 10-90 %')
+        ax.plot(month, median, color=BLUE, lw=1.3, label='weather "paper", sampled sites: median')
+        for weather, world, colour in zip(WEATHERS, (there, as_observed), (ORANGE, PURPLE), strict=True):
+            label = f'weather "{weather}", climate of US-Prr: median'
+            ax.plot(month, np.nanmedian(world[name], axis=0), color=colour, lw=1.5, label=label)
         ax.plot(month, towers["ERA-Interim"][name], color=BLACK, lw=1.5, label="ERA-Interim 1989-2014, US-Prr")
         ax.plot(month, towers["US-Prr"][name], color=GREEN, lw=1.2, ls="--", label="US-Prr 2011-14")
         ax.set_xticks(month, [calendar.month_abbr[m][0] for m in month])
         ax.set_title(statistic.label)
-        ax.set_ylabel("" if statistic.unit == "1" else statistic.unit)
+        ax.set_ylabel(AXES.get(name, statistic.unit))
     handles, labels = axes[0].get_legend_handles_labels()
     axes[-1].axis("off")
     axes[-1].legend(handles, labels, loc="center left")
