@@ -1,7 +1,11 @@
-"""What `analysis/scaling.py` makes of its measurements. How fast anything is, is no test's business."""
+"""What `analysis/scaling.py` makes of its measurements, and the Python of its page. How fast anything is, is no test's
+business."""
+
+import re
 
 import numpy as np
 import pytest
+from scripts import ROOT
 
 import sim
 from analysis import excerpts, scaling
@@ -32,3 +36,24 @@ def test_repeated_stands_go_on_as_those_they_repeat():
     five = scaling.repeated(first, 5, time_step_minutes=1440)
     record = five.step(np.full(5, NO_CHANGE))
     np.testing.assert_array_equal(record, first.step(np.full(2, NO_CHANGE))[[0, 1, 0, 1, 0]])
+
+
+@pytest.mark.slow
+def test_the_pages_python_runs(tmp_path, monkeypatch):
+    """As it stands, but for a coarser grid and fewer years."""
+    for package in ("xarray", "zarr", "matplotlib", "torch"):
+        pytest.importorskip(package)
+    import matplotlib
+
+    matplotlib.use("Agg")
+    page = (ROOT / "docs" / "scaling.md").read_text(encoding="utf-8")
+    smaller = {"65, 0.5": "65, 4", "140, 1.0": "140, 25", "years=50": "years=2", "years=20": "years=10"}
+    code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
+    for given, instead in smaller.items():
+        assert given in code
+        code = code.replace(given, instead)
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    exec(compile(code, "docs/scaling.md", "exec"), names)
+    assert names["thaw"].shape == (3, 2) and names["thaw"].gt(0).all(axis=None)
+    assert (tmp_path / "region.zarr").is_dir() and (tmp_path / "planted.zarr").is_dir()
