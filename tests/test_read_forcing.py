@@ -141,6 +141,36 @@ def test_what_solar_time_leaves_of_a_day_repeats_the_day_beside_it(weather):
     assert forcing.air_temperature_c.iloc[0] == forcing.air_temperature_c.iloc[48]
 
 
+def middles(table):
+    return pd.to_datetime(table["TIMESTAMP_START"].astype(str)) + pd.Timedelta(minutes=15)
+
+
+def test_times_may_be_the_middles_of_intervals(weather):
+    table = records.icos().drop(columns="TIMESTAMP_END").assign(TIMESTAMP_START=lambda t: middles(t).astype(str))
+    said = sim.read_forcing(table, columns={"time_middle": "TIMESTAMP_START"}, **SWEDEN)
+    np.testing.assert_allclose(said[NAMES], weather, rtol=0, atol=1e-12)
+    for arguments in ({}, {"gaps": "fill"}):
+        message = (
+            r"row 0: TIMESTAMP_START is 2018-12-31 23:45, 15 minutes off .* say columns={'time_middle': 'TIMESTAMP"
+        )
+        with pytest.raises(ValueError, match=message):
+            sim.read_forcing(table, **arguments, **SWEDEN)
+    both = {"time_middle": "TIMESTAMP_START", "time_end": "TIMESTAMP_START"}
+    with pytest.raises(ValueError, match="columns: one of .* is allowed, got time_end, time_middle"):
+        sim.read_forcing(table, columns=both, **SWEDEN)
+    seven = table.assign(TIMESTAMP_START=(middles(table) - pd.Timedelta(minutes=23)).astype(str))
+    with pytest.raises(ValueError, match=r"23:37, 7 minutes off .* full intervals are allowed$"):
+        sim.read_forcing(seven, **SWEDEN)
+
+
+def test_the_report_has_the_shift_and_what_it_leaves_and_all_is_100_percent():
+    report = sim.read_forcing(records.fluxnet(90).assign(TA_F_QC=2), **SWEDEN).attrs["report"]
+    assert "air_temperature_c: TA_F [degC]; 100 % filled by its source" in report
+    assert any(
+        "moved by +30 minutes" in line and "is +19.1 from" in line and "-10.9 are left" in line for line in report
+    )
+
+
 def test_years_are_chosen_and_29_february_is_dropped():
     forcing = sim.read_forcing(records.POKER_FLAT, years=(2012, 2013), **ALASKA)
     assert len(forcing) == 2 * 365 * 48 and "29 February was dropped 1 times" in forcing.attrs["report"]
@@ -285,7 +315,7 @@ BAD = {
     "pressure in Pa": (era5(lambda t: t.assign(sp=973.0)), r"sp is 973 Pa, which is 9.73 hPa.*if it is in hPa"),
     "humidity as a share": (
         lambda: tower(lambda t: t.assign(RH=t.RH / 100), made=records.icos),
-        r"RH in %: relative humidity is 1 % in half of all warm intervals; .*units={'RH': ..}",
+        r"2019: RH in %: 8\d % of it would be set to the limits .*; it would be usual in '1': units={'RH': '1'}; unu",
     ),
     "humidity of 140 %": (
         with_value("RH", 140.0, made=records.icos),
@@ -321,7 +351,7 @@ BAD = {
     ),
     "gentle rain by the day": (
         lambda: tower(P_F=2.0, days=365),
-        r"P_F in mm: precipitation is 3.5e\+04 mm a year; .*units={'P_F': ..}, of mm, m, kg m-2 s-1, .*mm d-1$",
+        r"P_F in mm: precipitation is 3.5e\+04 mm a year; .* would be usual in 'mm d-1': units={'P_F': 'mm d-1'}; unu",
     ),
     "light with an offset": (
         lambda: tower(lambda t: t.assign(SW_IN_F=t.SW_IN_F - 50.0)),
@@ -438,6 +468,7 @@ BAD_ARGUMENTS = {
         r"years = 2020: the record is from 2019-01-01 to 2019-07-19; it has no whole",
     ),
     "years of text": ({"years": "2019"}, r"years: a year or \(first, last\) is allowed, got '2019'"),
+    "unknown way with what is unusual": ({"unusual": "keep"}, r"unusual 'keep': allowed are refuse, take"),
     "cycle of another type": ({"diurnal_cycle": 3.0}, r"diurnal_cycle: a sim.DiurnalCycle is allowed, got 3.0"),
 }
 
@@ -449,12 +480,170 @@ def test_a_bad_argument_is_refused_in_one_line(arguments, message):
     assert "\n" not in str(refusal.value)
 
 
-def test_a_unit_that_is_given_is_believed():
-    dry = tower(lambda t: t.assign(VPD_F=t.VPD_F / 10))
-    kilopascal = sim.read_forcing(dry, units={"VPD_F": "kPa"}, **SWEDEN)
-    pd.testing.assert_frame_equal(kilopascal, sim.read_forcing(tower(), **SWEDEN))
-    damp = sim.read_forcing(dry, units={"VPD_F": "hPa"}, **SWEDEN)
-    assert damp.relative_humidity.min() > 0.85
+OWN = {
+    "air_temperature": ("Tair", "degC"),
+    "humidity": ("dry", "hPa"),
+    "wind_speed": ("u", "m s-1"),
+    "shortwave": ("sun", "W m-2"),
+    "longwave": ("sky", "W m-2"),
+    "precipitation": ("rain", "mm"),
+}
+
+
+def own(factors=None, units=None, of_ours=None, **more):
+    """A record of names of one's own, its columns multiplied or otherwise changed, and its units said."""
+    names = dict(zip(("TA_F", "VPD_F", "WS_F", "SW_IN_F", "LW_IN_F", "P_F"), OWN.values(), strict=True))
+    table = records.fluxnet()[["TIMESTAMP_START", *names]].rename(columns={k: name for k, (name, _) in names.items()})
+    for name, factor in (factors or {}).items():
+        table[name] *= factor
+    if of_ours:
+        table[of_ours[0]] = of_ours[1](table[of_ours[0]])
+    columns = {quantity: name for quantity, (name, _) in OWN.items()}
+    return sim.read_forcing(table, columns=columns, units={**dict(OWN.values()), **(units or {})}, **more, **SWEDEN)
+
+
+UNITS = {
+    "VPD in kPa": ("dry", 0.1, r"dry in hPa: relative humidity is above 93 % .*; it would be usual in 'kPa'", "kPa"),
+    "light in MJ": (
+        "sun",
+        0.0018,
+        r"sun in W m-2: a clear day has 0.1\d+ %.*; it would be usual in 'MJ m-2'",
+        "MJ m-2",
+    ),
+    "rain in m": (
+        "rain",
+        0.001,
+        r"rain in mm: precipitation is 0.591 mm a year; .*; it would be usual in 'm' or .*'rain': 'm'}",
+        "m",
+    ),
+    "rain by the hour": ("rain", 10.0, r"rain in mm: precipitation is 5.91e\+03 mm a year; ", None),
+}
+
+
+@pytest.mark.parametrize("name, factor, message, unit", UNITS.values(), ids=UNITS)
+def test_a_unit_that_is_said_is_not_believed_against_the_whole_column(weather, name, factor, message, unit):
+    with pytest.raises(ValueError, match=rf"2019: {message}.*; unusual='take' takes it as it is$") as refused:
+        own({name: factor})
+    assert "\n" not in str(refused.value)
+    if unit:
+        said = own({name: factor}, {name: unit})
+        np.testing.assert_allclose(said[NAMES], weather, rtol=1e-9, atol=1e-9)
+
+
+def test_what_is_unusual_is_taken_where_the_caller_says_so_and_by_simulate_too():
+    taken = own({"dry": 0.1, "rain": 0.001}, unusual="take")
+    assert taken.relative_humidity.min() > 0.85
+    lines = [line for line in taken.attrs["report"] if line.startswith("unusual, and taken as it is: ")]
+    assert [line.split(": ")[2] for line in lines] == ["dry in hPa", "rain in mm"] and len(taken.attrs["unusual"]) == 2
+    assert check_forcing(taken, 30, 1)[1] == 365
+    taken.attrs.clear()
+    with pytest.raises(ValueError, match="precipitation_mm is 0.591 mm a year"):
+        check_forcing(taken, 30, 1)
+    assert own().attrs["unusual"] == []
+
+
+def column(name, change, rows=slice(None), made=records.icos):
+    """The year with rows of a column changed by a function of them."""
+    table = made()
+    table.loc[rows, name] = change(table.loc[rows, name])
+    return table
+
+
+def still(name, value, first, days, made=records.icos):
+    return column(name, lambda _: value, slice(first, first + 48 * days - 1), made)
+
+
+UNUSUAL = {
+    "humidity beyond saturation": (
+        lambda: column("RH", lambda v: np.minimum(1.12 * v, 109.0)),
+        r"2019: RH in %: [23]\d % of it would be set to the limits of relative humidity; allowed units are %, 1",
+    ),
+    "a winter's humidity as a share": (
+        lambda: column("RH", lambda v: v / 100)[: 48 * 60],
+        r"RH in %: [78]\d % of it would be set to .*; it would be usual in '1': units={'RH': '1'}",
+    ),
+    "noise of a gauge": (
+        lambda: column("P", lambda v: v - 0.05 * (v.index % 10 == 0)),
+        r"P is below 0 in (9|10)[\d.]* % of its intervals",
+    ),
+    "outgoing longwave": (
+        lambda: records.icos().assign(LW_IN=lambda t: 0.98 * 5.67e-8 * (t.TA + 273.15) ** 4),
+        r"LW_IN in W m-2: the sky gives 98 % of what a black body .*; 65 to 95 are usual",
+    ),
+    "a dim sky": (lambda: still("LW_IN", 100.0, 0, 365), r"LW_IN in W m-2: the sky gives 30.\d %"),
+    "a bright sky": (lambda: still("LW_IN", 599.0, 0, 365), r"LW_IN in W m-2: the sky gives 182 %"),
+    "a sky that is the same": (
+        lambda: still("LW_IN", 300.0, 0, 365),
+        r"LW_IN is 300 W m-2 from 2019-01-01 00:00 solar time on for 365 days without a change; .* at most 5;",
+    ),
+    "wind of parts": (
+        era5(lambda t: t.assign(u10=4.0 * t.u10, v10=4.0 * t.v10), days=60),
+        r"u10 in m s-1: wind is [\d.]+ m s-1 in the mean",
+    ),
+    "wind of the hour": (
+        lambda: column("WS", lambda v: 2.5 * v),
+        r"wind is 7.3\d m s-1 .*; it would be usual in 'km h-1' or 'knot' or 'mph': units={'WS': 'km h-1'}",
+    ),
+    "no wind": (lambda: still("WS", 0.0, 0, 365), r"WS is 0 m s-1 from 2019-01-01 .* for 365 days"),
+    "rain in inches": (
+        lambda: column("P", lambda v: v / 25.4),
+        r"P in mm: precipitation is 23.3 mm a year; \[100, 5000\] is usual; it would be usual in 'cm' or 'in': ",
+    ),
+    "air that stands still": (
+        lambda: still("TA", -3.2, 1000, 3),
+        r"the table: TA is -3.2 degC from 2019-01-21 20:00 solar time on for 3 days without a change; .* most 2;",
+    ),
+    "humidity that stands still": (lambda: still("RH", 80.0, 1000, 11), r"RH is 0.8 from 2019-01-21 .* for 11 days"),
+    "a deficit that stands still": (
+        lambda: still("VPD_F", 3.0, 8000, 11, records.fluxnet),
+        r"VPD_F is 3 hPa from 2019-06-16 .* for 11 days",
+    ),
+    "saturated for a season": (lambda: still("RH", 100.0, 0, 31), r"RH is 1 from 2019-01-01 .* for 31 .* at most 30;"),
+    "a dark June": (lambda: still("SW_IN", 0.0, 8000, 20), r"SW_IN is 0 W m-2 from 2019-06-16 .* for 20 days"),
+    "no rain": (lambda: still("P", 0.0, 3000, 130), r"P is 0 mm from 2019-03-04 .* for 13\d days .* at most 120"),
+    "the sun at midnight": (
+        lambda: still("SW_IN", 1400.0, 8016, 1 / 48),
+        r"SW_IN is 1400 W m-2 at 2019-06-17 00:00 solar time, where the sun above the atmosphere gives [\d.]+; 1 of ",
+    ),
+    "summer in January": (
+        lambda: still("TA", 49.0, 700, 1 / 48),
+        r"TA is 49 degC at 2019-01-15 14:00 solar time, where the days around have -11.2 in the median; 1 of 17520 ",
+    ),
+    "January in July": (lambda: still("TA", -74.0, 9500, 1 / 48), r"TA is -74 degC at 2019-07-17 22:00 .* have 13.5 "),
+}
+
+
+@pytest.mark.parametrize(("make", "message"), UNUSUAL.values(), ids=UNUSUAL)
+def test_what_no_weather_and_no_sensor_gives_is_refused_and_may_be_taken(make, message):
+    table = make()
+    place = UTC if "t2m" in table else SWEDEN
+    with pytest.raises(ValueError, match=message) as refused:
+        sim.read_forcing(table, **place)
+    line = str(refused.value)
+    assert "\n" not in line and line.endswith("; unusual='take' takes it as it is")
+    taken = sim.read_forcing(table, unusual="take", **place).attrs["unusual"]
+    assert taken[0] == line.removesuffix("; unusual='take' takes it as it is")
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: still("RH", 100.0, 0, 20),  # fog, or a sensor that is wet
+        lambda: still("SW_IN", 0.0, 48 * 340, 20),  # December
+        lambda: column("SW_IN", lambda v: v - 9.0, slice(0, 48 * 30)).assign(SW_IN=lambda t: t.SW_IN.clip(lower=-9.0)),
+        lambda: still("P", 0.0, 3000, 60),
+    ],
+)
+def test_what_weather_and_sensors_give_is_read(make):
+    assert sim.read_forcing(make(), **SWEDEN).attrs["unusual"] == []
+
+
+def test_only_the_years_that_are_wanted_have_to_be_right():
+    table = pd.read_csv(records.POKER_FLAT)
+    table.loc[table.TIMESTAMP // 10000 == 2014, "WS_F"] = 0.0
+    with pytest.raises(ValueError, match="WS_F is 0 m s-1 from 2014-01-01 on for 365 days"):
+        sim.read_forcing(table, **ALASKA)
+    assert len(sim.read_forcing(table, years=(2011, 2013), **ALASKA)) == 3 * 365 * 48
 
 
 @pytest.mark.parametrize(
@@ -473,8 +662,30 @@ def test_another_unit_in_a_year_of_several_is_refused(name, factor, message):
 
 
 def test_no_unit_makes_light_of_what_is_none():
-    with pytest.raises(ValueError, match=r"SW_IN_F in J m-2: a clear day has 0.\d+ % .*of W m-2, J m-2"):
+    with pytest.raises(ValueError, match=r"SW_IN_F in J m-2: a clear day has 0.\d+ % .*; it would be usual in 'W m-2'"):
         sim.read_forcing(tower(), units={"SW_IN_F": "J m-2"}, **SWEDEN)
+
+
+@pytest.mark.parametrize(
+    "name, unit, of_ours",
+    [
+        ("Tair", "degF", lambda v: 1.8 * v + 32.0),
+        ("u", "km h-1", lambda v: 3.6 * v),
+        ("u", "knot", lambda v: v / 0.514444),
+        ("u", "mph", lambda v: v / 0.44704),
+        ("rain", "cm", lambda v: v / 10.0),
+        ("rain", "in", lambda v: v / 25.4),
+    ],
+)
+def test_units_of_the_weather_service(weather, name, unit, of_ours):
+    np.testing.assert_allclose(own(of_ours=(name, of_ours), units={name: unit})[NAMES], weather, rtol=2e-6, atol=1e-9)
+
+
+def test_fahrenheit_and_km_an_hour_are_named_where_a_value_is_beyond_its_limits():
+    with pytest.raises(ValueError, match=r"TA is [\d.]+ degC; .*; if it is in degF, say units={'TA': 'degF'}"):
+        sim.read_forcing(column("TA", lambda v: 1.8 * v + 32.0), **SWEDEN)
+    with pytest.raises(ValueError, match=r"WS is 64.8108 m s-1; .*; if it is in km h-1, say units={'WS': 'km h-1'}"):
+        sim.read_forcing(column("WS", lambda v: 3.6 * v), **SWEDEN)
 
 
 @pytest.mark.parametrize("unit, factor", [("mm d-1", 48.0), ("mm h-1", 2.0)])
@@ -509,17 +720,60 @@ BAD_FILES = {
     "names of no one": ("date,t,q\n20190101,1,1\n", r"tower.csv: no column for air temperature: none of TA_F"),
     "decimal commas between commas": (
         "TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n20190101,1,5,1,1,10,0\n",
-        r"line 2: 7 fields; the header has 6 names",
+        r"line 2: 7 fields; the header has 6 names \(lines above the names have to be removed, or begin with #\)",
     ),
     "days before months": (
         "TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n01.02.2019,1,1,1,10,0\n02.02.2019,1,1,1,10,0\n",
         r"line 2: TIMESTAMP is '01.02.2019'; a time as 201906031230 or 2019-06-03 12:30 is allowed",
+    ),
+    "a row of units": (
+        "TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\nyyyy,degC,hPa,m s-1,W m-2,mm\n20190101,1,1,1,10,0\n",
+        r"line 2: TIMESTAMP is 'yyyy'; .* is allowed; rows of units below the names have to be removed",
     ),
     "an empty line": (
         "# tower\nTIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n20190101,1,1,1,10,0\n\n20190102,1,1,1,10,0\n",
         r"line 4: TIMESTAMP is nan",
     ),
 }
+
+
+def test_the_file_of_a_campbell_logger(tmp_path):
+    table = records.icos(90).drop(columns="TIMESTAMP_START").rename(columns={"TIMESTAMP_END": "TIMESTAMP"})
+    table["TIMESTAMP"] = pd.to_datetime(table["TIMESTAMP"].astype(str)).astype(str)
+    rows = table.astype({"PA": object}).assign(PA="NAN").to_csv(index=False, header=False)
+    names = ",".join(f'"{name}"' for name in table)
+    kinds = ",".join(['""'] * len(table.columns))
+    head = f'"TOA5","Svb","CR1000","1","CR1000.Std.32","CPU:a.CR1","1","Met",1,2,3,4\n{names}\n{kinds}\n{kinds}\n'
+    (tmp_path / "logger.dat").write_text(head + rows)
+    end = {"columns": {"time_end": "TIMESTAMP"}}
+    forcing = sim.read_forcing(tmp_path / "logger.dat", **end, **SWEDEN)
+    np.testing.assert_allclose(forcing[NAMES], records.measured().iloc[: 48 * 90], rtol=0, atol=1e-12)
+    (tmp_path / "logger.dat").write_text(head.replace('"', "") + rows.replace("-", "x", 1))
+    with pytest.raises(ValueError, match=r"logger.dat, line 5: TIMESTAMP is '2019x01-01 00:00"):
+        sim.read_forcing(tmp_path / "logger.dat", **end, **SWEDEN)
+
+
+@pytest.mark.parametrize("form", ["%Y%m%d%H%M", "%Y-%m-%d %H:%M", "%Y-%m-%dT%H:%M:%S"])
+def test_24_00_is_0_00_of_the_next_day(weather, form):
+    table = records.icos().drop(columns="TIMESTAMP_START")
+    ends = pd.to_datetime(table["TIMESTAMP_END"].astype(str))
+    midnight = ends == ends.dt.normalize()
+    before = (ends - pd.Timedelta(days=1)).dt.strftime(form.replace("%H", "24"))
+    table["TIMESTAMP_END"] = ends.dt.strftime(form).where(~midnight, before)
+    pd.testing.assert_frame_equal(sim.read_forcing(table, **SWEDEN)[NAMES], weather, check_freq=False)
+
+
+@pytest.mark.parametrize("step", [1, 2])
+def test_an_hour_twice_in_autumn_is_said_to_be_of_summer_time(step):
+    table = records.icos().drop(columns="TIMESTAMP_END")[::step]
+    times = pd.to_datetime(table["TIMESTAMP_START"].astype(str)).dt.floor(f"{30 * step}min")
+    summer = times.dt.tz_localize("Etc/GMT-1").dt.tz_convert("Europe/Stockholm").dt.tz_localize(None)
+    table["TIMESTAMP_START"] = summer.astype(str)
+    table = table[summer >= "2019-06-01"]
+    with pytest.raises(
+        ValueError, match=r"2019-10-27 02:00 is there twice, .*; a clock of summer time has an hour twic"
+    ):
+        sim.read_forcing(table, **SWEDEN)
 
 
 @pytest.mark.parametrize(("text", "message"), BAD_FILES.values(), ids=BAD_FILES)

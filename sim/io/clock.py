@@ -12,6 +12,7 @@ from sim.io.table import Table
 DAY = 1440  # minutes
 MOST_MINUTES = 120
 _FORMATS = {8: "%Y%m%d", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
+_DAY_END = re.compile(r"(^\d{8}|[ T])24(:?00(?::?00)?)$")  # 24:00
 _WITH_ZONE = re.compile(r":\d\d(?:\.\d+)?\s?(?:Z|[+-]\d\d(?::?\d\d)?)$")
 
 
@@ -21,6 +22,8 @@ def read_times(table: Table, texts: pd.Series, name: str) -> pd.DatetimeIndex:
         times = pd.Series(texts)
     else:
         text = texts.astype("string").str.strip().str.replace(r"\.0$", "", regex=True)
+        given, text = text, text.str.replace(_DAY_END, r"\g<1>00\g<2>", regex=True)
+        day_end = (text != given).fillna(False)
         known = text.dropna()
         first = known.iloc[0] if len(known) else ""
         if first.isdigit():
@@ -30,11 +33,15 @@ def read_times(table: Table, texts: pd.Series, name: str) -> pd.DatetimeIndex:
         else:
             without_zone = text.where(~text.str.contains(_WITH_ZONE).fillna(False))
             times = pd.to_datetime(without_zone, format="ISO8601", errors="coerce")  # no guess of day and month
+        times = times + pd.to_timedelta(day_end.astype(int), unit="D")
     wrong = times.isna().to_numpy()
     if wrong.any():
         row = int(np.argmax(wrong))
+        no_digit = not any(letter.isdigit() for letter in str(texts.iloc[row]))
+        hint = "; rows of units below the names have to be removed" if row == 0 and no_digit else ""
         raise ValueError(
-            f"{table.where(row)}: {name} is {texts.iloc[row]!r}; a time as 201906031230 or 2019-06-03 12:30 is allowed"
+            f"{table.where(row)}: {name} is {texts.iloc[row]!r}; a time as 201906031230 or 2019-06-03 12:30 is "
+            f"allowed{hint}"
         )
     return pd.DatetimeIndex(times)
 
@@ -60,7 +67,11 @@ def interval_of(table: Table, times: pd.DatetimeIndex) -> int:
         row = int(back[0]) + 1
         first = int(np.argmax(times == times[row]))
         if first < row:
-            raise ValueError(f"{table.where(row)}: {_text(times[row])} is there twice, first in {table.where(first)}")
+            autumn = times[row].month in (9, 10, 11) and minutes[row - 1] > -60.0
+            hint = "; a clock of summer time has an hour twice: standard time all year is allowed" if autumn else ""
+            raise ValueError(
+                f"{table.where(row)}: {_text(times[row])} is there twice, first in {table.where(first)}{hint}"
+            )
         raise ValueError(
             f"{table.where(row)}: {_text(times[row])} follows {_text(times[row - 1])}; times have to increase"
         )
@@ -79,7 +90,7 @@ def interval_of(table: Table, times: pd.DatetimeIndex) -> int:
 
 
 def kind_of_times(table: Table, choice: Choice, interval: int) -> str:
-    """What the times are, once the interval is known: "start", "end", "instant" or "day"."""
+    """What the times are, once the interval is known: "start", "end", "middle", "instant" or "day"."""
     if interval == DAY:
         return "day"
     if choice.time_kind == "day":

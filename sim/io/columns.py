@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 #: Unit -> (factor, offset) into ours, by kind of quantity. Per interval: the factor is divided by its seconds.
-_TEMPERATURE = {"degC": (1.0, 0.0), "K": (1.0, -273.15)}
+_TEMPERATURE = {"degC": (1.0, 0.0), "K": (1.0, -273.15), "degF": (5.0 / 9.0, -160.0 / 9.0)}
+_SPEED = {"m s-1": (1.0, 0.0), "km h-1": (1.0 / 3.6, 0.0), "knot": (1852.0 / 3600.0, 0.0), "mph": (0.44704, 0.0)}
 _PRESSURE = {"hPa": (1.0, 0.0), "kPa": (10.0, 0.0), "Pa": (0.01, 0.0)}
 _RADIATION = {"W m-2": (1.0, 0.0), "J m-2": (1.0, 0.0), "kJ m-2": (1e3, 0.0), "MJ m-2": (1e6, 0.0)}
 PER_INTERVAL = ("J m-2", "kJ m-2", "MJ m-2")  # to be divided by the seconds of the interval
@@ -17,12 +18,18 @@ _UNITS = {
     "deficit": _PRESSURE,
     "relative_humidity": {"%": (0.01, 0.0), "1": (1.0, 0.0)},
     "dew_point": _TEMPERATURE,
-    "wind_speed": {"m s-1": (1.0, 0.0)},
-    "eastward_wind": {"m s-1": (1.0, 0.0)},
-    "northward_wind": {"m s-1": (1.0, 0.0)},
+    "wind_speed": _SPEED,
+    "eastward_wind": _SPEED,
+    "northward_wind": _SPEED,
     "shortwave": _RADIATION,
     "longwave": _RADIATION,
-    "precipitation": {"mm": (1.0, 0.0), "m": (1e3, 0.0), **dict.fromkeys(RATES, (1.0, 0.0))},
+    "precipitation": {
+        "mm": (1.0, 0.0),
+        "cm": (10.0, 0.0),
+        "m": (1e3, 0.0),
+        "in": (25.4, 0.0),
+        **dict.fromkeys(RATES, (1.0, 0.0)),
+    },
     "air_pressure": _PRESSURE,
 }
 
@@ -99,7 +106,7 @@ NAMES = {
     "eastward_wind": dict.fromkeys(("u10", "10m_u_component_of_wind", "u_component_of_wind_10m"), "m s-1"),
     "northward_wind": dict.fromkeys(("v10", "10m_v_component_of_wind", "v_component_of_wind_10m"), "m s-1"),
 }
-TIMES = ("time_start", "time_end", "time")
+TIMES = ("time_start", "time_end", "time_middle", "time")
 NEEDED = ("air_temperature", "humidity", "wind_speed", "shortwave", "precipitation")
 OF_REANALYSIS = re.compile(r"t2m|d2m|ssrd|strd|tp|sp|[uv]10|si10|.*2m.*|.*10m.*|surface_.*|total_precipitation.*")
 _POSITION = re.compile(r"(_\d+){1,3}|_\d+_\d+_A")  # of a sensor: horizontal, vertical, replicate
@@ -113,7 +120,6 @@ class Column:
     name: str
     kind: str
     unit: str
-    unit_given: bool = False
     quality: str | None = None
     reanalysis: str | None = None
 
@@ -261,14 +267,21 @@ def _column(record, quantity, name, names, table, units) -> Column:
     quality = f"{name}_QC" if f"{name}_QC" in table else None
     reanalysis = next((n for n in names if n.endswith("_ERA") and n in table and n != name), None)
     same = reanalysis if reanalysis and names[reanalysis] == unit else None
-    return Column(name, kind, unit, name in units, quality, same)
+    return Column(name, kind, unit, quality, same)
 
 
 def _time(record, table, columns, reanalysis: bool) -> tuple[str, str]:
-    """The column of times, and what they are: "start", "end", "instant" or "day"."""
+    """The column of times, and what they are: "start", "end", "middle", "instant" or "day"."""
     given = [quantity for quantity in TIMES if quantity in columns]
+    if len(given) > 1:
+        raise ValueError(f"columns: one of {', '.join(TIMES)} is allowed, got {', '.join(given)}")
     if given:
-        kinds = {"time_start": "start", "time_end": "end", "time": "instant" if reanalysis else "day"}
+        kinds = {
+            "time_start": "start",
+            "time_end": "end",
+            "time_middle": "middle",
+            "time": "instant" if reanalysis else "day",
+        }
         return columns[given[0]], kinds[given[0]]
     for name, kind in (("TIMESTAMP_START", "start"), ("TIMESTAMP_END", "end"), ("TIMESTAMP", "day")):
         if name in table:
@@ -278,7 +291,7 @@ def _time(record, table, columns, reanalysis: bool) -> tuple[str, str]:
             return name, "instant" if reanalysis else "day"
     raise ValueError(
         f"{record}: no column of times: none of TIMESTAMP_START, TIMESTAMP_END, TIMESTAMP, valid_time, time; name "
-        f"yours: columns={{'time_start': '..'}} or 'time_end'; the record has {_some(table)}"
+        f"yours: columns={{'time_start': '..'}}, 'time_end' or 'time_middle'; the record has {_some(table)}"
     )
 
 

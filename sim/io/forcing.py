@@ -7,11 +7,12 @@ import pandas as pd
 
 from sim.io import gaps as filling
 from sim.io import reanalysis
+from sim.io.check import percent, unusual_lines
 from sim.io.clock import DAY, check_ends, hours_apart, interval_of, kind_of_times, minutes_ahead, noon_of, read_times
 from sim.io.columns import LIMITS, NAMES, Choice, Column, choose
-from sim.io.disaggregation import FOREST_CYCLE, DiurnalCycle, half_hours, saturation_water
+from sim.io.disaggregation import FOREST_CYCLE, DiurnalCycle, climate_of, half_hours, saturation_water
 from sim.io.longwave import cloud_cover, longwave
-from sim.io.plausible import check_sun, check_units
+from sim.io.plausible import check_sun
 from sim.io.table import Table, open_table
 from sim.parameters import SITE_PARAMETERS
 from sim.state import FORCING
@@ -32,6 +33,7 @@ OURS = dict(
     zip(("air_temperature", "humidity", "wind_speed", "shortwave", "longwave", "precipitation"), FORCING, strict=True)
 )
 GAPS = ("refuse", "fill")
+UNUSUAL = ("refuse", "take")
 EDGE_HOURS = 12.5
 #: What is no more than a sum's or a sensor's last digit, and not worth a flag.
 ROUND_OFF = {"shortwave": 0.1, "precipitation": 1e-3}
@@ -51,6 +53,7 @@ def read_forcing(
     columns=None,
     units=None,
     diurnal_cycle=FOREST_CYCLE,
+    unusual="refuse",
 ):
     """Weather of a record as `sim.simulate(forcing=...)` takes it.
 
@@ -67,9 +70,13 @@ def read_forcing(
     gaps : "refuse" raises at the first; "fill" fills those of up to `longest_gap_days` days and flags them: by the
         reanalysis column that the record has beside it, on a straight line over three hours, as the mean of the same
         time of day in the weeks around (Falge et al. 2001); longwave by temperature, humidity and sunlight.
-    columns : names of your own: {"air_temperature": "Tair", "time_start": "begin", ..}.
+    columns : names of your own: {"air_temperature": "Tair", "time_start": "begin", ..}. Times are "time_start",
+        "time_end" or "time_middle" of their intervals, or the "time" of a reanalysis or a day.
     units : of columns whose unit is not the usual one, or not known: {"Tair": "K"}.
     diurnal_cycle : `sim.DiurnalCycle` of temperature, of a daily record.
+    unusual : "refuse" raises at what no weather or no sensor gives though each value is within its limits, such as a
+        column of another unit or a sensor that stands still (`sim.io.check.unusual_lines`); "take" takes it, and the
+        report says what it was.
 
     Returns
     -------
@@ -78,9 +85,9 @@ def read_forcing(
     does not have is computed (`sim.io.longwave`). `attrs["report"]` says in lines what is from where and what was done,
     `attrs["site"]` what the record tells of the site: `sim.simulate` takes it from there.
 
-    Raises ValueError for what is missing, unknown, out of its limits or of another unit, naming line, time and column.
+    Raises ValueError for what is missing, unknown, out of its limits or unusual, naming line, time and column.
     """
-    _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_gap_days, diurnal_cycle)
+    _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_gap_days, diurnal_cycle, unusual)
     table = open_table(source)
     recognised = _recognised(table.columns, columns, units)
     rows = table.read(recognised)
@@ -96,6 +103,9 @@ def read_forcing(
         times, utc_offset_h = times.tz_convert("UTC").tz_localize(None), 0.0
     interval = interval_of(table, times)
     kind = kind_of_times(table, choice, interval)
+    if kind == "middle":
+        times = times - pd.Timedelta(minutes=interval / 2)
+    _check_grid(table, times, interval, choice.time)
     report = list(choice.notes)
 
     record, flags, row_of = _values(table, rows, choice, times, interval)
@@ -110,7 +120,6 @@ def read_forcing(
     flags.index = row_of.index = record.index
     record = _derived(record, choice, flags)
 
-    check_units(table.name, record, choice.columns, latitude_deg, interval)
     if interval != DAY:
         if longitude_deg is None:
             raise ValueError("longitude_deg is needed to tell solar time: degrees east, such as 19.8 or -147.5")
@@ -121,15 +130,23 @@ def read_forcing(
         shift = interval * round(ahead / interval)
         for each in (record, flags, row_of):
             each.index = each.index + pd.Timedelta(minutes=shift)
-        word = "ahead of" if shift >= 0 else "behind"
-        report.append(f"times are local solar time, {abs(shift)} minutes {word} the record's clock")
+        report.append(
+            f"times are moved by {shift:+d} minutes, whole intervals, to local solar time, which is {ahead:+.1f} from "
+            f"the record's clock: {ahead - shift:+.1f} are left"
+        )
 
     wanted = _whole_days(table, record.index, interval, years)
     record, flags, row_of = record.reindex(wanted), flags.reindex(wanted), row_of.reindex(wanted)
+    taken = []
+    for line in unusual_lines(table.name, record, choice.columns, latitude_deg, interval, _relative_humidity):
+        if unusual == "refuse":
+            raise ValueError(f"{line}; unusual='take' takes it as it is")
+        taken.append(line)
+    report += [f"unusual, and taken as it is: {line}" for line in taken]
     _repeat_at_edges(record, flags, row_of, interval, report)
     _fill(table, record, flags, row_of, choice, interval, gaps, longest_gap_days)
     _add_longwave(record, flags, choice, latitude_deg)
-    site = _site(record, latitude_deg)
+    site = {"latitude_deg": float(latitude_deg), **climate_of(record["air_temperature"])}
     flags = flags.fillna(GIVEN).astype("int8")
     if interval == DAY:
         forcing, flags = _in_half_hours(record, flags, choice, latitude_deg, diurnal_cycle)
@@ -148,14 +165,14 @@ def read_forcing(
             f"air pressure is {record['air_pressure'].mean():.0f} hPa ({pressure.name}), which is not used: give it as "
             "constants={'air_pressure_hpa': ..}"
         )
-    forcing.attrs = {"report": _sources(forcing, choice) + report, "site": site, "flags": dict(FLAGS)}
+    forcing.attrs = {"report": _sources(forcing, choice) + report, "site": site, "flags": dict(FLAGS), "unusual": taken}
     return forcing
 
 
 # ------------------------------------------------------------------------------------------------------- arguments
 
 
-def _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_gap_days, diurnal_cycle) -> None:
+def _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_gap_days, diurnal_cycle, unusual) -> None:
     latitude = SITE_PARAMETERS["latitude_deg"]
     limits = {
         "latitude_deg": (latitude_deg, latitude.physical_low, latitude.physical_high, False),
@@ -170,8 +187,21 @@ def _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_ga
             raise ValueError(f"{name} = {value!r}: a number in [{low:g}, {high:g}] is allowed")
     if gaps not in GAPS:
         raise ValueError(f"gaps {gaps!r}: allowed are {', '.join(GAPS)}")
+    if unusual not in UNUSUAL:
+        raise ValueError(f"unusual {unusual!r}: allowed are {', '.join(UNUSUAL)}")
     if not isinstance(diurnal_cycle, DiurnalCycle):
         raise ValueError(f"diurnal_cycle: a sim.DiurnalCycle is allowed, got {diurnal_cycle!r}")
+
+
+def _check_grid(table: Table, times: pd.DatetimeIndex, interval: int, name: str) -> None:
+    """Refuse intervals that do not begin and end on the full interval: they would lie between those of a day."""
+    off = (times[0] - times[0].normalize()) / pd.Timedelta(minutes=1) % interval
+    if interval != DAY and off:
+        hint = f"; if they are the middles of intervals, say columns={{'time_middle': {name!r}}}"
+        raise ValueError(
+            f"{table.where(0)}: {name} is {times[0]:%Y-%m-%d %H:%M}, {off:g} minutes off the full interval of "
+            f"{interval}; starts or ends at full intervals are allowed{hint if 2 * off == interval else ''}"
+        )
 
 
 def _offset_needed(record: pd.DataFrame, interval: int, longitude_deg: float) -> str:
@@ -210,6 +240,14 @@ def _recognised(names: list[str], columns: dict | None, units: dict | None) -> l
 def _is_empty(texts: pd.Series) -> bool:
     values = pd.to_numeric(texts, errors="coerce")
     return bool((texts.isna() | (values <= -9990.0)).all())
+
+
+def _relative_humidity(kind: str, values: np.ndarray, air_temperature: np.ndarray) -> np.ndarray:
+    """Relative humidity of a column of a kind, at air temperatures in degC; it may be above 1."""
+    if kind == "relative_humidity":
+        return values
+    saturated = saturation(air_temperature)
+    return saturation(values) / saturated if kind == "dew_point" else 1.0 - np.maximum(values, 0.0) / saturated
 
 
 def _values(table: Table, rows: pd.DataFrame, choice: Choice, times: pd.DatetimeIndex, interval: int):
@@ -282,13 +320,11 @@ def _derived(record: pd.DataFrame, choice: Choice, flags: pd.DataFrame) -> pd.Da
     if "eastward_wind" in record:
         record["wind_speed"] = np.hypot(record.pop("eastward_wind"), record.pop("northward_wind"))
         flags["wind_speed"] = 0
-    saturated = saturation(record["air_temperature"].to_numpy())
+    kind = choice.columns["humidity"].kind
+    for name in ("humidity", "precipitation"):
+        record[f"{name}_measured"] = record[name]
     for name in [name for name in ("humidity", "humidity_beside") if name in record]:
-        values, kind = record[name].to_numpy(), choice.columns["humidity"].kind
-        if kind == "deficit":
-            humidity = 1.0 - np.maximum(values, 0.0) / saturated
-        else:
-            humidity = saturation(values) / saturated if kind == "dew_point" else values
+        humidity = _relative_humidity(kind, record[name].to_numpy(), record["air_temperature"].to_numpy())
         limited = np.where(np.isnan(humidity), np.nan, np.clip(humidity, 0.05 if kind == "deficit" else 0.01, 1.0))
         record[name] = limited
         if name == "humidity":
@@ -442,19 +478,6 @@ def _in_half_hours(record, flags, choice: Choice, latitude_deg: float, cycle: Di
     return forcing, each.set_axis(forcing.index)
 
 
-def _site(record: pd.DataFrame, latitude_deg: float) -> dict[str, float]:
-    """What the record tells of the site: latitude, and of whole years the mean and the first harmonic of the warmth."""
-    site = {"latitude_deg": float(latitude_deg)}
-    days = record["air_temperature"].groupby(record.index.normalize()).mean().dropna()  # a year may lack 29 February
-    if len(days) >= 365:
-        angle = 2.0 * math.pi * (pd.DatetimeIndex(days.index).day_of_year.to_numpy() - 0.5) / 365.25
-        anomaly = days.to_numpy() - days.mean()
-        wave = [2.0 * (anomaly * shape(angle)).mean() for shape in (np.cos, np.sin)]
-        site["mean_annual_temperature_c"] = float(days.mean())
-        site["seasonal_amplitude_c"] = float(math.hypot(*wave))
-    return site
-
-
 def _sources(forcing: pd.DataFrame, choice: Choice) -> list[str]:
     lines = []
     for quantity, name in OURS.items():
@@ -463,7 +486,7 @@ def _sources(forcing: pd.DataFrame, choice: Choice) -> list[str]:
         if quantity == "longwave" and column is None:
             of = "computed (Prata 1996; Crawford and Duchon 1999)"
         shares = forcing[f"{name}_flag"].value_counts(normalize=True).sort_index()
-        flagged = [f"{100 * share:.2g} % {FLAGS[flag]}" for flag, share in shares.items() if flag != GIVEN]
+        flagged = [f"{percent(share)} {FLAGS[flag]}" for flag, share in shares.items() if flag != GIVEN]
         if quantity == "longwave" and column is None:
             flagged = []
         lines.append(f"{name}: {of}" + "".join(f"; {each}" for each in flagged))

@@ -98,6 +98,9 @@ def _csv(path: Path) -> Table:
         comments, header = 0, file.readline()
         while header.startswith("#"):  # as AmeriFlux begins
             comments, header = comments + 1, file.readline()
+        below = 0
+        if header.lstrip('"').startswith("TOA5"):  # of Campbell's loggers: station, names, units, kinds of mean
+            comments, header, below = comments + 1, file.readline(), 2
     if not header.strip():
         raise ValueError(f"forcing: {path.name}, line {comments + 1}: a row of column names is needed, got nothing")
     separator = max(",;\t", key=header.count)
@@ -106,19 +109,20 @@ def _csv(path: Path) -> Table:
     if twice:
         raise ValueError(f"forcing: {path.name}, line {comments + 1}: column {twice[0]} is there twice")
 
-    _check_fields(path, separator, len(columns))
+    _check_fields(path, separator, len(columns), comments)
 
     def read(names: list[str]) -> pd.DataFrame:
         # times stay text; a row of nothing is a row, so that lines can be counted
         table = pd.read_csv(
             path,
             sep=separator,
-            skiprows=comments + 1,
+            skiprows=comments + 1 + below,
             header=None,
             names=columns,
             usecols=names,
             index_col=False,
             skip_blank_lines=False,
+            na_values=["NAN"],  # as Campbell's loggers write it
             dtype={name: str for name in names if _is_time(name)},
             low_memory=False,
             encoding="utf-8-sig",
@@ -126,16 +130,20 @@ def _csv(path: Path) -> Table:
         empty = table.isna().all(axis=1).to_numpy()
         return table.iloc[: len(table) - int(np.argmin(empty[::-1])) if len(table) and not empty.all() else 0]
 
-    return Table(path.name, columns, read, first_line=comments + 2)
+    return Table(path.name, columns, read, first_line=comments + 2 + below)
 
 
-def _check_fields(path: Path, separator: str, most: int) -> None:
-    """Refuse a row of more fields than there are names, such as of decimal commas: it would be read shifted."""
+def _check_fields(path: Path, separator: str, most: int, above: int) -> None:
+    """Refuse a row of more fields than there are names, such as of decimal commas: it would be read shifted. above :
+    lines above the names."""
     with gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else path.open(encoding="utf-8") as file:
         for number, line in enumerate(file, start=1):
             fields = line.rstrip(f"{separator}\r\n").count(separator) + 1
-            if fields > most and '"' not in line and not line.startswith("#"):
-                raise ValueError(f"forcing: {path.name}, line {number}: {fields} fields; the header has {most} names")
+            if number > above and fields > most and '"' not in line:
+                raise ValueError(
+                    f"forcing: {path.name}, line {number}: {fields} fields; the header has {most} names (lines above "
+                    "the names have to be removed, or begin with #)"
+                )
 
 
 def _is_time(name: str) -> bool:
