@@ -30,7 +30,7 @@ from sim.closure import TOLERANCES
 from sim.demography import AGES
 from sim.management import LARGEST_DENSITY, LEAST_DENSITY
 from sim.organic import LEAST_DEPTH_M
-from sim.parameters import ORDERED_CONSTANTS, Parameter
+from sim.parameters import ORDERED_CONSTANTS, WHOLE_CONSTANTS, Parameter
 from sim.physical_constants import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.spin_up import CLASS_NAMES, INITIAL_LIMITS
 from sim.stands import available_cores
@@ -161,7 +161,7 @@ def draw_constants(generator, corners: bool) -> dict[str, float]:
     while disordered := [pair for pair in ORDERED_CONSTANTS if constants[pair[0]] >= constants[pair[1]]]:
         pair = {name: sim.CONSTANTS[name] for name in disordered[0]}
         constants |= draw_values(generator, pair, "physical", corners)
-    return constants
+    return constants | {name: float(round(constants[name])) for name in WHOLE_CONSTANTS}
 
 
 def draw_actions(generator, years: int) -> np.ndarray:
