@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.studies.constant_plans import ENVIRONMENTS
-from baselines_heuristic import conifer_restoration, random_valid, target_density
+from baselines_heuristic import conifer_restoration, obeying, random_valid, target_density
 from cleanrl_style import protocol
 from cleanrl_style.protocol import course, reference, sites
 
@@ -40,13 +40,8 @@ def measure(task: protocol.Task, test: list[int], validation: list[int]) -> pd.D
     """Returns of the constant plans on sites of both splits, and of the fixed strategies on the first test sites."""
     tables = [reference.measure(task, [*test, *validation])]
     for name, policy in STRATEGIES.items():
-
-        def probabilities(observations, masks, accrued_returns, policy=policy):
-            chosen = policy(observations, masks)
-            return np.eye(25)[chosen] if chosen.ndim == 1 else chosen
-
         corner = np.eye(task.num_objectives)[0]
-        episodes, _ = protocol.evaluate(task, probabilities, [corner], len(test), ("sampled",))
+        episodes, _ = protocol.evaluate(task, obeying(policy), [corner], len(test), ("sampled",))
         tables.append(episodes.assign(plan=name)[tables[0].columns])
     return pd.concat(tables, ignore_index=True)
 

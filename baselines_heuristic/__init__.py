@@ -32,18 +32,34 @@ class Args:
     """start over in a folder that already holds a run"""
 
 
+def obeying(policy):
+    """A strategy as it is played: probabilities (n, 25), of observations (n, d) and masks (n, 25).
+
+    policy gives actions (n,), or probabilities already. Where the mask forbids its action, nothing is done.
+    """
+    import numpy as np
+
+    from boreal_env import NO_CHANGE
+
+    def probabilities(observations, masks, accrued_returns=None):
+        chosen = policy(observations, masks)
+        if chosen.ndim == 2:
+            return chosen
+        return np.eye(25)[np.where(np.take_along_axis(masks, chosen[:, None], 1)[:, 0], chosen, NO_CHANGE)]
+
+    return probabilities
+
+
 def main(script: str, policy) -> None:
     """Evaluate `policy`, a function of observations (n, d) and masks (n, 25), as the script of that name.
 
-    It gives actions (n,), or probabilities of actions (n, 25), and does not look at the preference: its episodes
-    are the same under every weight, and are simulated once. An action that the mask forbids is not taken, and nothing
-    is done. None has another policy when greedy: random actions stay random.
+    It does not look at the preference: its episodes are the same under every weight, and are simulated once. None has
+    another policy when greedy: random actions stay random.
     """
     args = parse(Args)  # a bad flag is answered before all that follows is loaded
 
     import numpy as np
 
-    from boreal_env import NO_CHANGE
     from cleanrl_style import protocol
 
     task = protocol.make_task(args)
@@ -53,12 +69,11 @@ def main(script: str, policy) -> None:
         groups = "preference, state and age"
         protocol.fail(f"--env-id {args.env_id}: fixed strategies look at {groups}; observation_groups must have them")
 
+    played = obeying(policy)
+
     def action_probabilities(observations, masks, accrued_returns):
         # laid out as for two objectives, whatever their number: a strategy does not look at the weights
-        chosen = policy(observations[:, task.num_objectives - 2 :], masks)
-        if chosen.ndim == 2:
-            return chosen
-        return np.eye(25)[np.where(np.take_along_axis(masks, chosen[:, None], 1)[:, 0], chosen, NO_CHANGE)]
+        return played(observations[:, task.num_objectives - 2 :], masks)
 
     with protocol.Run(args, task, Path(script).stem) as run:
         start = time.perf_counter()

@@ -2,8 +2,9 @@ import gymnasium as gym
 import numpy as np
 import pandas as pd
 import pytest
-from scripts import run_script
+from scripts import ROOT, run_script
 
+from analysis.runs import read_run
 from baselines_heuristic import conifer_restoration, plus_100, random_valid, target_density, zero_change
 from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
@@ -96,3 +97,13 @@ def test_users_environments_are_refused(tmp_path):
     with pytest.raises(SystemExit, match="observation_groups must have them"):
         run_script("baselines_heuristic/target_density.py", "--env-id", "unseen-v0", "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("env_id", ["boreal-generalist-v0", "boreal-balanced-v0"])
+@pytest.mark.parametrize("script", ["target_density", "conifer_restoration", "random_valid"])
+def test_what_a_runs_picture_compares_with_is_what_the_script_gives(script, env_id):
+    shipped, _ = reference.read(reference.shipped(env_id))
+    run = read_run(ROOT / "results" / "runs" / script / env_id / "seed1")
+    archived = run.of_policy("greedy").groupby("seed")[["carbon_return", "thaw_return"]].mean()
+    ours = shipped[shipped.plan == script].set_index("seed")[["carbon_return", "thaw_return"]]
+    pd.testing.assert_frame_equal(ours.sort_index(), archived.sort_index(), rtol=1e-4, check_dtype=False)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.exploring.stands import YEARS, Stand
-from baselines_heuristic import conifer_restoration, plus_100, random_valid, target_density, zero_change
+from baselines_heuristic import conifer_restoration, obeying, plus_100, random_valid, target_density, zero_change
 from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
 from cleanrl_style.protocol.evaluation import choose_actions
@@ -19,13 +19,9 @@ Player = Callable[[Stand], int]
 
 
 def of_strategy(policy) -> Player:
-    """A strategy of `baselines_heuristic`, which gives actions (1,) or probabilities (1, 25)."""
-
-    def play(stand: Stand) -> int:
-        chosen = policy(stand.observation[None], stand.masks[None])
-        return int(chosen[0]) if chosen.ndim == 1 else drawn(chosen, stand)
-
-    return play
+    """A strategy of `baselines_heuristic`, as its script plays it."""
+    played = obeying(policy)
+    return lambda stand: drawn(played(stand.observation[None], stand.masks[None]), stand)
 
 
 #: What the page calls a fixed strategy -> the player.
