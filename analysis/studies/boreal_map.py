@@ -23,6 +23,7 @@ import boreal_env
 import sim
 from analysis import paths, stored
 from analysis.methods import STRATEGIES
+from baselines_heuristic import obeying
 from cleanrl_style import protocol
 from sim.executor import HERE
 from sim.management import decode
@@ -65,7 +66,7 @@ def policy_of(args: Args) -> tuple[str, str, Callable]:
     """Name, environment and function of a policy."""
     if args.policy in STRATEGIES:
         module = importlib.import_module(f"baselines_heuristic.{args.policy}")
-        return args.policy, args.env_id or BALANCED, module.policy
+        return args.policy, args.env_id or BALANCED, obeying(module.policy)
     try:
         policy = protocol.load_policy(args.policy)
     except (FileNotFoundError, ValueError) as error:
