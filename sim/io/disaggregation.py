@@ -106,7 +106,7 @@ def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = F
 
 
 def climate_of(air_temperature_c: pd.Series) -> dict[str, float]:
-    """Site parameters of a record of temperature, indexed by time: mean and first harmonic; none of less than a year."""
+    """Site parameters of a record [degC], indexed by time: its mean and first harmonic; none of less than a year."""
     days = air_temperature_c.groupby(air_temperature_c.index.normalize()).mean().dropna()  # it may lack 29 February
     if len(days) < DAYS:
         return {}

@@ -7,12 +7,11 @@ import pandas as pd
 
 from sim.io import gaps as filling
 from sim.io import reanalysis
-from sim.io.check import percent, unusual_lines
 from sim.io.clock import DAY, check_ends, hours_apart, interval_of, kind_of_times, minutes_ahead, noon_of, read_times
 from sim.io.columns import LIMITS, NAMES, Choice, Column, choose
 from sim.io.disaggregation import FOREST_CYCLE, DiurnalCycle, climate_of, half_hours, saturation_water
 from sim.io.longwave import cloud_cover, longwave
-from sim.io.plausible import check_sun
+from sim.io.plausible import check_sun, percent, unusual_lines
 from sim.io.table import Table, open_table
 from sim.parameters import SITE_PARAMETERS
 from sim.state import FORCING
@@ -75,8 +74,8 @@ def read_forcing(
     units : of columns whose unit is not the usual one, or not known: {"Tair": "K"}.
     diurnal_cycle : `sim.DiurnalCycle` of temperature, of a daily record.
     unusual : "refuse" raises at what no weather or no sensor gives though each value is within its limits, such as a
-        column of another unit or a sensor that stands still (`sim.io.check.unusual_lines`); "take" takes it, and the
-        report says what it was.
+        column of another unit or a sensor that stands still (`sim.io.plausible`); "take" takes it, and the report says
+        what it was.
 
     Returns
     -------
