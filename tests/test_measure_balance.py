@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+import boreal_env
 from analysis.studies import measure_balance
 
 
@@ -23,7 +24,13 @@ def test_only_what_no_other_policy_beats_counts():
     assert measure_balance.within_site_spread(sums, chosen).tolist() == [0.5, 0.5, 1.0]
 
 
-def test_actions_that_are_not_valid_become_no_change():
+def test_every_reference_policy_obeys_masks():
     masks = np.zeros((2, 25), dtype=bool)
+    masks[:, boreal_env.NO_CHANGE] = True
     masks[0, 24] = True
-    assert measure_balance.where_valid(masks, 24).tolist() == [24, 12]
+    policies = measure_balance.reference_policies()
+    assert policies["action 24"](np.zeros((2, 105), np.float32), masks).argmax(axis=1).tolist() == [24, 12]
+    only_no_change = np.arange(25)[None] == np.full((2, 1), boreal_env.NO_CHANGE)
+    for policy in policies.values():
+        chosen = policy(np.zeros((2, 105), np.float32), only_no_change).argmax(axis=1)
+        assert (chosen == boreal_env.NO_CHANGE).all()

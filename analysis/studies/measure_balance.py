@@ -1,9 +1,9 @@
 """Measures the carbon scale of `boreal-balanced-v0`, at which both returns vary equally in its world.
 
-Reference policies, the 25 constant actions (no change where an action is not valid) and the four fixed strategies,
-play the same sites and weathers. The spread of a return is its standard deviation between those policies of a site that
-a preference chooses between: those that no other beats in both returns. It is pooled over sites. Carbon counts as the
-net change over the carbon scale, before penalties and clipping, so that its spread is in proportion to 1 /
+Reference policies, the 25 constant actions and the four fixed strategies, play the same sites and weathers; where an
+action is not valid, nothing is done. The spread of a return is its standard deviation between those policies of a site
+that a preference chooses between: those that no other beats in both returns. It is pooled over sites. Carbon counts as
+the net change over the carbon scale, before penalties and clipping, so that its spread is in proportion to 1 /
 carbon_scale; thaw as rewarded.
 """
 
@@ -13,7 +13,7 @@ import moocore
 import numpy as np
 
 import boreal_env
-from baselines_heuristic import conifer_restoration, plus_100, target_density, zero_change
+from baselines_heuristic import conifer_restoration, obeying, plus_100, target_density, zero_change
 from cleanrl_style import protocol
 from cleanrl_style.protocol import final_info
 
@@ -31,15 +31,11 @@ class Args:
 
 
 def reference_policies() -> dict:
-    """Name -> function of observations (n, d) and masks (n, 25) that gives actions (n,)."""
-    constant = {f"action {a}": lambda observations, masks, a=a: where_valid(masks, a) for a in range(25)}
-    strategies = (zero_change, plus_100, target_density, conifer_restoration)
-    return constant | {strategy.__name__.rsplit(".")[-1]: strategy.policy for strategy in strategies}
-
-
-def where_valid(masks: np.ndarray, action: int) -> np.ndarray:
-    """The action where it can be carried out in full, no change elsewhere; masks (n, 25), actions (n,)."""
-    return np.where(masks[:, action], action, boreal_env.NO_CHANGE)
+    """Name -> function of observations (n, d) and masks (n, 25) that gives probabilities (n, 25), all of one action."""
+    policies = {f"action {a}": lambda observations, masks, a=a: np.full(len(masks), a) for a in range(25)}
+    for strategy in (zero_change, plus_100, target_density, conifer_restoration):
+        policies[strategy.__name__.rsplit(".")[-1]] = strategy.policy
+    return {name: obeying(policy) for name, policy in policies.items()}
 
 
 def play(args: Args, **reward) -> np.ndarray:
@@ -53,7 +49,7 @@ def play(args: Args, **reward) -> np.ndarray:
     for policy in reference_policies().values():
         observations, _ = envs.reset(seed=seeds)
         for _ in range(args.years):
-            observations, _, _, _, infos = envs.step(policy(observations, envs.action_masks()))
+            observations, _, _, _, infos = envs.step(policy(observations, envs.action_masks()).argmax(axis=1))
         years = [final_info(infos, site, ["years"])["years"] for site in range(args.sites)]
         sums.append([[record[name].sum() for name in columns] for record in years])
     return np.array(sums)
