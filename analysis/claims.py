@@ -1,6 +1,7 @@
 """Writes docs/reproduction.md: every claim of the paper that a number can test, with ours and a verdict.
 
-    python analysis/claims.py [--runs-dir results/runs] [--output docs/reproduction.md]
+    python analysis/claims.py
+    python analysis/claims.py --runs-dir runs    # of your own runs, into runs/reproduction.md
 
 Reads the archived runs, the studies, and the paper's tables (analysis/paper_tables). A claim without its runs says
 which command makes them. The claims are in analysis/paper_claims, a module a theme; numbers, intervals and verdicts are
@@ -103,7 +104,7 @@ class Args:
     runs_dir: tuple[Path, ...] | None = None
     """folders that hold the runs, at any depth (None: the archive, results/runs or results/quick/runs)"""
     output: Path | None = None
-    """the document (None: docs/reproduction.md, or results/quick/reproduction.md)"""
+    """the document (None: docs/reproduction.md or results/quick/reproduction.md; with --runs-dir: there)"""
     quick: bool = False
     """from the runs of `reproduce.py --quick`"""
 
@@ -226,11 +227,18 @@ def document(results: Results) -> tuple[str, Counter]:
     return text, sum((votes(findings, kind) for kind in KINDS), Counter())
 
 
+def folder_of(args: Args) -> Path:
+    """Where the document goes: the project's own is of the archive alone."""
+    if args.runs_dir:
+        return args.runs_dir[0]
+    return paths.results(quick=True) if args.quick else Path("docs")
+
+
 def main(args: Args) -> None:
     """Write the document; print how many claims have which verdict."""
     results = Results.load(args.quick, args.runs_dir or (paths.archive(args.quick),))
     text, counts = document(results)
-    path = args.output or (paths.results(quick=True) if args.quick else Path("docs")) / "reproduction.md"
+    path = args.output or folder_of(args) / "reproduction.md"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with protocol.replacing(path) as file:

@@ -1,4 +1,5 @@
 import re
+import shutil
 from itertools import permutations
 from pathlib import Path
 
@@ -34,6 +35,7 @@ from analysis.paper_claims.claim import (
     Finding,
     Number,
     Row,
+    Undefined,
     about,
     above,
     all_of,
@@ -43,7 +45,7 @@ from analysis.paper_claims.claim import (
     short,
     within,
 )
-from analysis.paper_claims.evidence import Evidence
+from analysis.paper_claims.evidence import Evidence, optional
 from analysis.results import Results
 from analysis.studies.mechanism_pairs import MEANS, OFF, PAIRS
 from cleanrl_style import protocol
@@ -509,6 +511,21 @@ def test_the_committed_document_shows_the_committed_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     claims.main(claims.Args(output=tmp_path / "reproduction.md"))
     assert (tmp_path / "reproduction.md").read_bytes() == (ROOT / "docs/reproduction.md").read_bytes()
+
+
+def test_a_document_of_ones_own_runs_lies_beside_them(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "docs").mkdir()
+    shutil.copytree(TINY_RUNS, tmp_path / "runs")
+    claims.main(claims.Args(runs_dir=(Path("runs"),)))
+    assert (tmp_path / "runs" / "reproduction.md").is_file() and not any((tmp_path / "docs").iterdir())
+
+
+def test_a_number_that_runs_do_not_have_is_not_called_not_run():
+    def undefined():
+        raise Undefined("none: the same returns at every weight")
+
+    assert optional(undefined) == "none: the same returns at every weight"
 
 
 def test_without_runs_it_says_which_command_makes_them(tmp_path):

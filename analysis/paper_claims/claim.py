@@ -36,6 +36,10 @@ class Missing(Exception):
     """What a claim needs is not there; the text says what."""
 
 
+class Undefined(Missing):
+    """The runs are there, but have no such number; the text says why."""
+
+
 @dataclass(frozen=True)
 class Number:
     """A number with its 95 % interval (NaN without one).

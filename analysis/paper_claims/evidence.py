@@ -7,7 +7,7 @@ import pandas as pd
 
 from analysis import metrics, stored
 from analysis.experiments import Job
-from analysis.paper_claims.claim import SEEDS, Missing, Number
+from analysis.paper_claims.claim import SEEDS, Missing, Number, Undefined
 from analysis.results import Replicate, Results
 from analysis.tables.common import over_seeds
 from analysis.tables.main_results import run_metrics
@@ -135,5 +135,7 @@ def optional(measure: Callable[[], Number]) -> Number | str:
     """A number that a claim shows but does not need."""
     try:
         return measure()
+    except Undefined as why:
+        return str(why)
     except Missing:
         return "not run yet"

@@ -7,8 +7,8 @@ from analysis.paper_claims.claim import (
     CONTROL,
     LEAST,
     QUARTER,
-    Missing,
     Row,
+    Undefined,
     about,
     above,
     all_of,
@@ -165,7 +165,7 @@ def violation(evidence, script: str, name: str = "violations_percent") -> pd.Ser
     if name == "violations_or_ties_percent":  # a policy that does the same at every weight has ties alone
         return table.reindex(columns=[name])[name].fillna(100.0)
     if name not in table:
-        raise Missing("a policy that differs between weights")
+        raise Undefined("none: the same returns at every weight")
     return table[name].dropna()
 
 
