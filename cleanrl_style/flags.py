@@ -9,7 +9,9 @@ import dataclasses
 import errno
 import importlib.util
 import io
+import itertools
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -17,9 +19,16 @@ from pathlib import Path
 POLICY, SHIPPED = "policy.pt", Path(__file__).with_name("policies")
 #: Environments that a training may have, at most.
 MAX_ENVS = 1000
+#: Sites that results are of (cleanrl_style/protocol/evaluation_sites.csv).
+TEST_SITES = 200
 #: Training resets environments with seeds below this one, evaluation from this one on.
 FIRST_EVALUATION_SEED = 1_000_000_000
 
+#: What tyro says of a value that is not a number, or not a whole one.
+PARSING = re.compile(
+    r"Error parsing (?P<flag>--\S+): (?P<why>invalid literal for int.*?|could not convert string to float|"
+    r"no type matching .*?(INT|FLOAT).*? could be instantiated from):? (?P<values>\[?'.*'\]?)\.?"
+)
 #: Closed interval of each argument that has one.
 LIMITS = {
     "seed": (0, FIRST_EVALUATION_SEED // MAX_ENVS - 1),
@@ -156,16 +165,32 @@ def parse(arguments: type):
     check_limits(args)
     if isinstance(getattr(args, "env_id", None), str):
         check_environment(args.env_id)
+    check_episodes(args)
     return args
 
 
 def message_of(box: str) -> str:
-    """What tyro says in its box: a title, its message, and below a rule help on the flag."""
+    """What tyro says in its box, in a line: its message, and the flags that it takes for the ones that were meant."""
     lines = [line.strip("│ ") for line in box.splitlines()]
     rules = [i for i, line in enumerate(lines) if line.startswith(("───", "---", "╰─"))]
     first = 2 if rules[0] == 1 else 1  # drawn in ASCII, the title has a rule of its own
     message = " ".join(filter(None, lines[first : rules[first - 1]]))
-    return message.partition(" Got errors:")[0]  # of each type that the flag may have
+    headings = ("Perhaps you meant:", "Arguments similar to --")
+    meant = [after.split()[0] for line, after in itertools.pairwise(lines) if line.startswith(headings)]
+    if meant:
+        return f"{message}; did you mean {', '.join(sorted({*meant}))}?"
+    return in_plain_words(message.partition(" Got errors:")[0])  # of each type that the flag may have
+
+
+def in_plain_words(message: str) -> str:
+    """What tyro says of a value that is not of its flag's type, without the names of types."""
+    found = PARSING.fullmatch(message)
+    if not found:
+        return message
+    flag, why, values = found["flag"], found["why"], " ".join(re.findall("'([^']*)'", found["values"]))
+    what = "whole number" if "int" in why.lower() else "number"
+    allowed = f"{what}s are" if "..." in why else f"a {what} is"
+    return f"{flag} {values}: {allowed} allowed"
 
 
 def check_lists(args) -> None:
@@ -214,6 +239,19 @@ def check_environment(env_id: str) -> None:
         gym.spec(env_id)
     except gym.error.Error as error:
         fail(f"--env-id {env_id or repr(env_id)}: {no_environment(error)}")
+
+
+def check_episodes(args) -> None:
+    """End the script with one line for more episodes than there are sites to evaluate on, each of which has one."""
+    if getattr(args, "eval_episodes", 0) <= TEST_SITES or getattr(args, "site_seed", None) is not None:
+        return
+    env_id, mode = args.env_id, args.mode
+    if env_id is not None and ":" not in env_id:
+        import gymnasium as gym
+
+        mode = gym.spec(env_id).kwargs.get("mode")
+    if mode == "generalist" or env_id is None and mode is None:
+        fail(f"--eval-episodes {args.eval_episodes}: at most {TEST_SITES} are allowed, as many as there are test sites")
 
 
 def no_environment(error: Exception) -> str:

@@ -1,5 +1,6 @@
 """`python -m boreal_env`, policies by name, and the commands that ship and score them."""
 
+import shutil
 import subprocess
 import sys
 
@@ -13,7 +14,7 @@ from scripts import ROOT, run_script
 import boreal_env
 from analysis import score_policy, ship_policies
 from cleanrl_style import flags, protocol
-from cleanrl_style.protocol import command_line
+from cleanrl_style.protocol import command_line, run_folder
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +84,33 @@ def test_a_policy_is_watched(shipped, tmp_path, capsys, monkeypatch):
     assert "carbon weight 0.30: return" in out and "doing nothing" in out and ": 4 years" in out
 
 
+def test_what_shows_other_years_has_another_name():
+    def name(*given):
+        args = command_line.arguments(["watch", "ppo_group", *given])
+        return command_line.name_of_animation(args, "ppo_group", "pond:pond-v0", np.array(args.preference))
+
+    assert name("--preference", "0.3", "0.7") == "ppo_group-pond-v0-preference0.3-seed0.gif"
+    others = ([], ["--seed", "1"], ["--site-seed", "1"], ["--sampled"], ["--site-seed", "1", "--seed", "1"])
+    assert len({name("--preference", weight, "0.7", *other) for weight in ("0.3", "0.4") for other in others}) == 10
+
+
+def test_an_agent_of_one_preference_is_watched_at_its_own(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(
+        protocol.Task, "make", lambda task, make=protocol.Task.make, **kwargs: make(task, years=2, **kwargs)
+    )
+    out = ["--out", str(tmp_path / "years.gif")]
+    command_line.main(["watch", "eupg_fixed_lambda", *out])
+    assert "carbon weight 0.50" in (said := capsys.readouterr().out) and "trained for" not in said
+    command_line.main(["watch", "eupg_fixed_lambda", "--preference", "0.1", *out])
+    assert "trained for the preference 0.5 alone" in capsys.readouterr().out
+
+
+def test_an_environment_that_draws_nothing_cannot_be_watched(run, monkeypatch):
+    monkeypatch.setattr(boreal_env.BorealEnv, "metadata", {"render_modes": []})
+    with pytest.raises(SystemExit, match="boreal-site-specific-v0 draws no pictures: its metadata"):
+        command_line.main(["watch", str(run)])
+
+
 @pytest.mark.parametrize(
     "given, message",
     [
@@ -107,6 +135,24 @@ def test_a_bad_command_gets_one_line(run, given, message, monkeypatch):
     with pytest.raises(SystemExit, match=message) as refused:
         command_line.main([word.format(run=run) for word in given])
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "name, harm",
+    [
+        ("evaluation.csv", lambda data: b""),
+        ("evaluation.csv", lambda data: data[:-3]),
+        ("evaluation.csv", lambda data: data[: data[:-1].rindex(b"\n") + 1]),
+        ("policy.pt", lambda data: data[: len(data) // 2]),
+    ],
+    ids=["empty", "cut in a number", "cut after a row", "half a policy"],
+)
+def test_a_finished_run_that_is_damaged_is_not_called_finished(run, tmp_path, name, harm):
+    folder = tmp_path / "run"
+    shutil.copytree(run, folder)
+    assert run_folder.damage_of(folder, 5) is None
+    (folder / name).write_bytes(harm((folder / name).read_bytes()))
+    assert run_folder.damage_of(folder, 5) == name
 
 
 def test_a_script_with_a_syntax_error_is_named_by_its_line(run, tmp_path):

@@ -12,7 +12,9 @@ import pytest
 from scripts import ROOT, run_script
 
 from analysis.outside import arguments
+from baselines_heuristic import Args
 from cleanrl_style import flags
+from cleanrl_style.protocol.sites import published_seeds
 
 SCRIPTS = sorted(path.stem for path in (ROOT / "cleanrl_style").glob("*.py") if "\nclass Agent" in path.read_text())
 OUTSIDE = sorted(path.stem for path in (ROOT / "analysis" / "outside").glob("*.py") if "parse(" in path.read_text())
@@ -39,13 +41,13 @@ def test_other_libraries_algorithms_answer_as_soon(script):
         pytest.skip(f"{library} is not installed")
     _, err = python("-X", "importtime", ROOT / "analysis" / "outside" / f"{script}.py", "--seed", "x").communicate()
     *loaded, answer = err.splitlines()
-    assert answer.startswith("error: Error parsing --seed: ")
+    assert answer.startswith("error: --seed x: a whole number")
     assert not {"torch", "numba", "pandas", "gymnasium"} & {line.split("|")[-1].strip() for line in loaded}
 
 
 def test_a_fixed_strategy_answers_as_soon():
     _, err = python("-X", "importtime", ROOT / "baselines_heuristic" / "zero_change.py", "--seed", "x").communicate()
-    assert err.splitlines()[-1].startswith("error: Error parsing --seed: ")
+    assert err.splitlines()[-1].startswith("error: --seed x: a whole number")
     assert " numba\n" not in err
 
 
@@ -78,13 +80,32 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
         (["--learning-rate", "nan"], r"--learning-rate must lie in \[1e-12, 1\], not nan"),
         (["--reward-scales"], "--reward-scales: at least one value is allowed"),
         (["--mode", "both"], "(.*both.*--mode|.*--mode.*both).*"),
-        (["--num-envs", "many"], r"Error parsing --num-envs: .* from \['many'\]\."),
+        (["--num-envs", "many"], "--num-envs many: a whole number is allowed"),
+        (["--total-timesteps", "3e5"], "--total-timesteps 3e5: a whole number is allowed"),
+        (["--gamma", "x"], "--gamma x: a number is allowed"),
+        (["--eval-weights", "0", "x"], "--eval-weights 0 x: numbers are allowed"),
+        (
+            ["--total-timestep", "5", "--lerning-rate", "1"],
+            r"Unrecognized options: .*; did you mean --learning-rate, --total-timesteps\?",
+        ),
+        (["--eval-episodes", "201"], "--eval-episodes 201: at most 200 are allowed, as many as there are test sites"),
+        (
+            ["--eval-episodes", "201", "--env-id", "boreal-balanced-v0"],
+            "--eval-episodes 201: at most 200 are allowed, .*",
+        ),
         (["--seed"], ".*--seed.*"),
     ],
 )
 def test_a_bad_value_is_named(given, message):
     with pytest.raises(SystemExit, match=f"^error: {message}$"):
         run_script("cleanrl_style/ppo_gated.py", *given)
+
+
+def test_one_site_has_as_many_episodes_as_are_asked_for(monkeypatch):
+    assert len(published_seeds("test")) == flags.TEST_SITES
+    for given in (["--site-seed", "3"], ["--mode", "site-specific"], ["--env-id", "boreal-site-specific-v0"]):
+        monkeypatch.setattr(sys, "argv", ["script", "--eval-episodes", "201", *given])
+        assert flags.parse(Args).eval_episodes == 201
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])

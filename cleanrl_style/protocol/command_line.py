@@ -73,7 +73,9 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     watch.add_argument("--env-id", help="another environment than the policy was trained on")
     watch.add_argument("--sampled", action="store_true", help="draw actions instead of the most probable ones")
     watch.add_argument("--window", action="store_true", help="show it in a window, instead of writing a GIF")
-    watch.add_argument("--out", type=Path, help="the GIF (<policy>-site<seed>.gif)")
+    watch.add_argument(
+        "--out", type=Path, help="the GIF (<script>-<environment>-preference<w>[-site<seed>]-seed<seed>.gif)"
+    )
     return parser.parse_args(argv)
 
 
@@ -133,17 +135,19 @@ def check_preference(given: list[float] | None, objectives: int) -> np.ndarray:
 
 def make_env(policy: Policy, env_id: str | None, site_seed: int | None) -> gym.Env:
     """The environment to watch a policy in: that of its training, or another with the same observation."""
-    kwargs = {} if site_seed is None else {"site_seed": site_seed}
-    if env_id is None:
-        env = policy.task().make(render_mode="rgb_array", **kwargs)
-    else:
-        env = gym.make(env_id, render_mode="rgb_array", **kwargs)
+
+    def make(**kwargs):
+        return policy.task().make(**kwargs) if env_id is None else gym.make(env_id, **kwargs)
+
+    env = make()
     if env.observation_space.shape != (policy.size,):
         raise ValueError(
             f"{policy.name} observes {policy.size} entries, {env.spec.id} has {env.observation_space.shape[0]}: "
             f"--env-id {policy.env_id} is what it was trained on"
         )
-    return env
+    if "rgb_array" not in (env.metadata or {}).get("render_modes", []):
+        raise ValueError(f"{env.spec.id} draws no pictures: its metadata['render_modes'] lacks 'rgb_array'")
+    return make(render_mode="rgb_array", **({} if site_seed is None else {"site_seed": site_seed}))
 
 
 def play(env: gym.Env, policy, seed: int, weights: np.ndarray):
@@ -192,26 +196,46 @@ def show(frames: list[np.ndarray]) -> None:
 def watch(args: argparse.Namespace) -> None:
     """Play the policy, say what it returned beside doing nothing, and show its years."""
     check(args)
-    seed, policy = args.seed, load_policy(args.policy, args.script)
-    env = make_env(policy, args.env_id, args.site_seed)
-    names = env.unwrapped.objective_names
-    weights = check_preference(args.preference, len(names))
+    policy = load_policy(args.policy, args.script)
+    env_id = args.env_id or policy.env_id
+    env, objectives = make_env(policy, args.env_id, args.site_seed), ask(env_id).objectives
+    trained_for = policy.arguments.get("preference")  # of a script with one preference throughout
+    own = None if trained_for is None else np.ravel(trained_for).tolist()
+    weights = check_preference(args.preference or own, len(objectives))
     generator = np.random.default_rng([args.seed, 1]) if args.sampled else None
     compile_physics([1])
-    frames, returns = play(env, lambda *given: policy.act(*given, generator=generator), seed, weights)
-    env.unwrapped.render_mode = None
-    _, nothing = play(env, lambda *given: boreal_env.NO_CHANGE, seed, weights)
-    print(f"{policy.name} on {args.env_id or policy.env_id}")
-    for name, weight, one, other in zip(names, weights, returns, nothing, strict=True):
-        print(f"{name:>12} weight {weight:.2f}: return {one:+.2f}, doing nothing {other:+.2f}, gain {one - other:+.2f}")
-    print(f"{'scalarised':>12} gain {weights @ (returns - nothing):+.2f}")
+    frames, returns = play(env, lambda *given: policy.act(*given, generator=generator), args.seed, weights)
+    print(f"{policy.name} on {env_id}")
+    if own is not None and not np.allclose(weights, check_preference(own, len(objectives))):
+        print(f"trained for the preference {' '.join(f'{weight:g}' for weight in own)} alone, whatever it is asked for")
+    print_returns(env, objectives, args.seed, weights, returns)
     if args.window:
         show(frames)
         return
-    site = f"seed{seed}" if args.site_seed is None else f"site{args.site_seed}"
-    path = args.out or Path(f"{policy.script}-{site}.gif")
+    path = args.out or Path(name_of_animation(args, policy.script, env_id, weights))
     save_animation(path, frames)
     print(f"wrote {path}: {len(frames) - 1} years")
+
+
+def print_returns(env: gym.Env, objectives, seed: int, weights: np.ndarray, returns: np.ndarray) -> None:
+    """What was returned; of a stand, beside what doing nothing returns there."""
+    if not isinstance(env.unwrapped, boreal_env.BorealEnv):
+        for name, weight, one in zip(objectives, weights, returns, strict=True):
+            print(f"{name:>12} weight {weight:.2f}: return {one:+.2f}")
+        return
+    env.unwrapped.render_mode = None
+    _, nothing = play(env, lambda *given: boreal_env.NO_CHANGE, seed, weights)
+    for name, weight, one, other in zip(objectives, weights, returns, nothing, strict=True):
+        print(f"{name:>12} weight {weight:.2f}: return {one:+.2f}, doing nothing {other:+.2f}, gain {one - other:+.2f}")
+    print(f"{'scalarised':>12} gain {weights @ (returns - nothing):+.2f}")
+
+
+def name_of_animation(args: argparse.Namespace, script: str, env_id: str, weights: np.ndarray) -> str:
+    """A GIF's name, another one for whatever shows other years."""
+    shown = weights[:1] if len(weights) == 2 else weights
+    parts = [script, env_id.split(":")[-1], f"preference{','.join(f'{weight:g}' for weight in shown)}"]
+    parts += [] if args.site_seed is None else [f"site{args.site_seed}"]
+    return "-".join([*parts, f"seed{args.seed}", *["sampled"] * args.sampled]) + ".gif"
 
 
 def main(argv: list[str] | None = None) -> None:

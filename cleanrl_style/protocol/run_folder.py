@@ -28,6 +28,7 @@ from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, not_default
 from cleanrl_style.protocol.course import Course
 from cleanrl_style.protocol.evaluation import PRIMARY, episodes_by_policy, lanes_of_evaluation
 from cleanrl_style.protocol.files import replacing
+from cleanrl_style.protocol.fronts import objectives_of, weight_columns
 from cleanrl_style.protocol.progress import Progress
 from cleanrl_style.protocol.reference import physics_name, reference_returns
 from cleanrl_style.protocol.score import Comparison
@@ -189,6 +190,9 @@ class Run:
                 "(--run-dir names another folder, --overwrite starts over)"
             )
         if (self.folder / "evaluation.csv").exists():
+            damaged = damage_of(self.folder, len(self.args.eval_weights))
+            if damaged:
+                fail(f"{self.folder / damaged} is damaged; --overwrite starts over")
             print(f"{self.folder}: this run is finished (--overwrite starts over)")
             sys.exit(0)
         code_here = {**self.config["versions"], "commit": self.config["commit"]}
@@ -446,6 +450,21 @@ def is_foreign(config_file: Path) -> bool:
     except ValueError:
         return False
     return not isinstance(config, dict) or not {"script", "arguments"} <= config.keys()
+
+
+def damage_of(folder: Path, weights: int) -> str | None:
+    """Which file of a finished run, all written whole, something has cut short or changed since; None if none."""
+    evaluation, policy = folder / "evaluation.csv", folder / "policy.pt"
+    try:
+        table = pd.read_csv(evaluation)
+        by_weight = table.groupby(["policy", *weight_columns(objectives_of(table.columns))]).size()
+        alike = by_weight.groupby("policy").agg(lambda episodes: len(episodes) == weights and episodes.nunique() == 1)
+        whole = evaluation.read_bytes().endswith(b"\n") and len(alike) and alike.all()
+    except (ValueError, KeyError):
+        whole = False
+    if not whole:
+        return evaluation.name
+    return policy.name if policy.exists() and not zipfile.is_zipfile(policy) else None
 
 
 def remove(path: Path) -> None:
