@@ -3,8 +3,9 @@
     python analysis/score_policy.py runs/ppo_group/boreal-balanced-v0-vectorization=lockstep/seed1
     python analysis/score_policy.py their_policy.pt --script their_method.py --name "Their method" --add
 
-A run's folder is checked first: its policy has to play the evaluation that lies beside it. --add puts the row into
-docs/leaderboard.csv, in place of the row of that name, and the table into docs/leaderboard.md.
+A run's folder is checked first: its policy has to play the evaluation that lies beside it, of which the first eight
+episodes of each weight are played again. --add puts the row into docs/leaderboard.csv, and the table into
+docs/leaderboard.md.
 """
 
 import re
@@ -41,6 +42,8 @@ class Args:
     """name of the row (None: the script's)"""
     add: bool = False
     """put the row into the leaderboard"""
+    replace: bool = False
+    """in place of the row of that name"""
     root: Path = Path()
     """folder of docs/"""
 
@@ -56,6 +59,8 @@ def check_flags(args: Args) -> None:
     page = args.root / PAGE
     if args.add and not (page.is_file() and SECTION.search(page.read_text(encoding="utf-8"))):
         fail(f"--root {args.root}: no {PAGE} with <!-- leaderboard --> to <!-- end of leaderboard -->")
+    if args.replace and not args.add:
+        fail("--replace goes with --add")
     if args.name is not None and (not args.name.strip() or {"|", "\n"} & set(args.name)):
         fail(f"--name {args.name!r}: a cell of a table, without |, is allowed")
     if args.script is not None and not (args.script.is_file() and args.script.suffix == ".py"):
@@ -136,6 +141,13 @@ def comparison(policy: protocol.Policy, task: protocol.Task, episodes: int) -> s
     return score.Comparison(evaluation, plans)
 
 
+def check_name(name: str, args: Args) -> None:
+    """ValueError if the leaderboard has a row of that name already, which is not to be replaced."""
+    table = args.root / TABLE
+    if args.add and not args.replace and table.exists() and name in set(pd.read_csv(table).name):
+        raise ValueError(f"--name {name!r}: {TABLE} has a row of that name; --replace puts this one in its place")
+
+
 def add(row: dict, root: Path) -> None:
     """Put a row into the leaderboard's table and page, the best on the balanced task first."""
     table = pd.DataFrame([row], columns=COLUMNS)
@@ -159,6 +171,7 @@ def main(args: Args) -> None:
             fail(f"--tasks {env_id}: constant plans, and so a score, are of the boreal environments alone")
     try:
         policy = protocol.load_policy(args.policy, args.script)
+        check_name(args.name or policy.script, args)
         tasks = [task_of(policy, env_id) for env_id in args.tasks]  # refused before anything is played
         print(f"{policy.name}: {policy.script}, {check(policy, args.policy)}")
         row = {

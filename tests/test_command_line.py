@@ -3,6 +3,8 @@
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -252,3 +254,8 @@ def test_rows_go_into_the_leaderboard(tmp_path):
     assert names == ["one", "two"]
     text = page.read_text(encoding="utf-8")
     assert text.index("| one |") < text.index("| two |") and text.endswith("end\n") and "| 90 |" in text
+    args = score_policy.Args(Path("ppo_group"), add=True, root=tmp_path)
+    with pytest.raises(ValueError, match="--name 'one': .* has a row of that name; --replace puts this one in"):
+        score_policy.check_name("one", args)
+    score_policy.check_name("three", args)
+    score_policy.check_name("one", replace(args, replace=True))
