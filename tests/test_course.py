@@ -75,7 +75,7 @@ def test_a_run_writes_draws_and_says_it(tmp_path, capsys, monkeypatch):
     assert table.global_step.tolist() == [200] * 3 + [400] * 3 and table.preference.tolist() == [0, 0.5, 1] * 2
     expected = table.preference * table.carbon_gain + (1 - table.preference) * table.thaw_gain
     np.testing.assert_allclose(table.scalarized_gain, expected, atol=1e-5)
-    assert "on 1 validation sites after 50, 100 % of the training" in out
+    assert "on 1 validation site after 50, 100 % of the training" in out
     assert "min left, score" in out
     timing = pd.read_csv(tmp_path / "timing.csv")
     assert (timing.phase == "validation").sum() == 2

@@ -50,6 +50,15 @@ class Course:
         return self._fits(self.shares)
 
     @property
+    def where(self) -> str:
+        """What it is played on, in words."""
+        if self.task.mode == "site-specific":
+            return "its site"
+        number = len(self.seeds)
+        what = "validation site" if self.task.draws_sites else "weather"
+        return f"{number} {what}{'s'[: number > 1]}"
+
+    @property
     def years(self) -> int:
         """Years of stands that it takes to play it once."""
         return len(self.seeds) * len(self.weights) * self.task.years

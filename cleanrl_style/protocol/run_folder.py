@@ -320,7 +320,7 @@ class Run:
         for row in gained.to_dict("records"):
             self.log("validation", {"global_step": global_step, **row})
         if self.shown is not None:
-            self.shown.note = f"score {self.course.score(gained):.0f} on {len(self.course.seeds)} validation sites"
+            self.shown.note = f"score {self.course.score(gained):.0f} on {self.course.where}"
         self.time("validation", global_step, time.perf_counter() - start)
 
     def log(self, table: str, row: dict) -> None:

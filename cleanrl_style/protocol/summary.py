@@ -94,10 +94,7 @@ def print_course(course: Course, table: pd.DataFrame) -> None:
         return
     scores = [f"{course.score(rows):z.0f}" for _, rows in table.groupby("global_step")]
     shares = [f"{100 * step / course.steps:.0f}" for step in table.global_step.unique()]
-    print(
-        f"Course: score {', '.join(scores)} on {len(course.seeds)} validation sites after {', '.join(shares)} % of the "
-        "training (greedy)"
-    )
+    print(f"Course: score {', '.join(scores)} on {course.where} after {', '.join(shares)} % of the training (greedy)")
 
 
 def followed(objectives, comparison: Comparison) -> str:
@@ -202,7 +199,7 @@ def _draw_course(axes, objectives, course: Course, table: pd.DataFrame) -> None:
     lines = (("best", ":", "best constant plan of each weight (100)"), ("plus_100", "--", "100 stems a year"))
     for name, style, label in lines:
         ax.axhline(marks[name].scalarized_gain.mean(), linestyle=style, color="black", label=label)
-    ax.set(ylabel="scalarized gain", title=f"training, gain over doing nothing on {len(course.seeds)} validation sites")
+    ax.set(ylabel="scalarized gain", title=f"training, gain over doing nothing on {course.where}")
     for one, column in zip(others, gain_columns(objectives), strict=False):
         for k, (key, rows) in enumerate(table.groupby(weights)):
             label, colour = f"{objectives[0]} weight " if len(key) == 1 else "weights ", f"C{k}"
