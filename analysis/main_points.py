@@ -1,20 +1,25 @@
-"""What README.md and docs/results.md say first: six rows of the main table, and what all its rows say, in words."""
+"""What README.md and docs/results.md say first: six rows of the main table, and what all its rows say, in words.
+
+Methods are compared with each other and with plans that look at nothing by the interval of their difference on the same
+sites, over training seeds and sites.
+"""
 
 import textwrap
 
 import numpy as np
 import pandas as pd
 
+import boreal_env
 from analysis import methods, metrics
 from analysis.experiments import BALANCED, GENERALIST
 from analysis.paper_claims.claim import FEWEST_SEEDS
 from analysis.tables import main_results
 
 WORLDS = (BALANCED, GENERALIST)
-BEST_PLAN = "best_constant_mix"
-PLANTING = "plus_100"
-SIX = (PLANTING, "eupg_var_lambda", "ppo_gated", "ppo_curriculum", "ppo_group")
-"""Rows of the README, between doing nothing, which is 0, and the best constant plans."""
+BEST_PLAN, DECIDUOUS = "best_constant_mix", "dense_deciduous"
+PLANTING = ("plus_100", "")
+LEARNED = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum", "ppo_group")
+"""Rows of the README below the plans that look at nothing."""
 NOT_RUN = "Not run yet: `python analysis/reproduce.py --only main balanced`.\n"
 
 
@@ -29,9 +34,9 @@ def default_rows(results, env_id: str) -> dict[tuple[str, str], list]:
     }
 
 
-def best_plan(results, env_id: str) -> list:
-    """The best constant plan of each weight, as `default_rows` has its rows; empty if its study is not there."""
-    return main_results.constant_plans(results)[BEST_PLAN, env_id, "default"]
+def blind(results, env_id: str, name: str) -> list:
+    """A constant plan, or the best of each weight, as `default_rows` has its rows; empty if its study is not there."""
+    return main_results.constant_plans(results)[name, env_id, "default"]
 
 
 def shown(scores: dict) -> str:
@@ -43,32 +48,53 @@ def shown(scores: dict) -> str:
 
 
 def six_rows(results) -> str:
-    """Scores of the best constant plans, of planting and of four trained methods, in both worlds.
+    """Scores of two plans that look at nothing and of four trained methods, in both worlds.
 
     That of a single training is not shown: another seed's may be far from it.
     """
     rows = {env_id: default_rows(results, env_id) for env_id in WORLDS}
     text = "| method | training seeds | " + " | ".join(f"`{env_id}`" for env_id in WORLDS) + " |\n" + "|---" * 4 + "|\n"
-    plans = [shown(main_results.scores(best_plan(results, env_id))) for env_id in WORLDS]
-    text += f"| the best constant plan of each preference | | {' | '.join(plans)} |\n"
-    for script in SIX:
+    plans = {
+        methods.title(*PLANTING): [rows[env_id].get(PLANTING, []) for env_id in WORLDS],
+        main_results.CONSTANT_PLANS[DECIDUOUS][0]: [blind(results, env_id, DECIDUOUS) for env_id in WORLDS],
+    }
+    for title, of_worlds in plans.items():
+        text += f"| {title} | | {' | '.join(shown(main_results.scores(one)) if one else '' for one in of_worlds)} |\n"
+    for script in LEARNED:
         of_worlds = [rows[env_id].get((script, ""), []) for env_id in WORLDS]
         seeds = " and ".join(dict.fromkeys(str(len(replicates)) for replicates in of_worlds if replicates))
-        what = (seeds if script in methods.TRAINED else "") if seeds else "not run yet"
-        fewest = 2 if script in methods.TRAINED else 1
-        cells = [shown(main_results.scores(one)) if len(one) >= fewest else "" for one in of_worlds]
-        text += f"| {methods.title(script)} | {what} | {' | '.join(cells)} |\n"
+        cells = [shown(main_results.scores(one)) if len(one) > 1 else "" for one in of_worlds]
+        text += f"| {methods.title(script)} | {seeds or 'not run yet'} | {' | '.join(cells)} |\n"
     return text
 
 
-def beats(replicates: list, other: list) -> bool:
-    """Whether the greedy policy gains more than a fixed strategy on the same sites, by its whole interval over training
-    seeds and sites; never of a single training, which has none."""
-    ours, theirs = (
-        pd.DataFrame([metrics.of_sites(one.by_policy["greedy"]) for one in rows]) for rows in (replicates, other)
-    )
-    _, low, _ = metrics.score_interval(ours - theirs.iloc[0], None)
-    return low > 0.0
+def on_sites(replicates: list) -> pd.DataFrame:
+    """What the greedy policies gain, (seeds, sites)."""
+    return pd.DataFrame([metrics.of_sites(one.by_policy["greedy"]) for one in replicates])
+
+
+def is_above(replicates: list, other: list) -> bool:
+    """Whether all of the interval of the difference lies above 0; never of a single training, which has none."""
+    return len(replicates) > 1 and metrics.difference_interval(on_sites(replicates), on_sites(other))[1] > 0.0
+
+
+def is_below(replicates: list, other: list) -> bool:
+    """Whether all of it lies below 0."""
+    return len(replicates) > 1 and metrics.difference_interval(on_sites(replicates), on_sites(other))[2] < 0.0
+
+
+def points(replicates: list, other: list, best_plans: list) -> str:
+    """The difference with its interval, in percent of what the best constant plans gain."""
+    found = metrics.difference_interval(on_sites(replicates), on_sites(other))
+    value, low, high = 100 * np.array(found) / on_sites(best_plans).to_numpy().mean()
+    return f"{value:.1f}" if len(replicates) < 2 else f"{value:.1f} [{low:.1f}, {high:.1f}]"
+
+
+def front_of_plans(results, env_id: str) -> float:
+    """Gain hypervolume of all constant plans together."""
+    plans = results.constant_plans_in(env_id, "asymmetric", None)
+    means = plans.groupby("action")[metrics.return_columns(metrics.objectives_of(plans.columns))].mean()
+    return metrics.hypervolume((means - means.loc[boreal_env.NO_CHANGE]).to_numpy(), 0.0)
 
 
 def in_words(results) -> str:
@@ -83,44 +109,71 @@ def paragraph(results, env_id: str) -> str:
     scores = {method: main_results.scores(replicates) for method, replicates in rows.items()}
     known = {method: its["score_greedy"] for method, its in scores.items() if not np.isnan(its["score_greedy"])}
     trained = [method for method in known if method[0] in methods.TRAINED]
-    planting = (PLANTING, "")
-    if not trained or planting not in known:
+    if not trained or PLANTING not in known:
         return ""
+    deciduous, best_plans = blind(results, env_id, DECIDUOUS), blind(results, env_id, BEST_PLAN)
     best = max(trained, key=known.__getitem__)
-    above = [method for method in trained if beats(rows[method], rows[planting])]
-    beat = [method for method in trained if beats(rows[method], best_plan(results, env_id))]
-    text = (
-        f"- **`{env_id}`.** Planting 100 stems a year without looking scores {known[planting]:.0f}. The best of "
-        f"{len(trained)} trained method{'s' if len(trained) > 1 else ''} is {methods.title(*best)} with "
-        f"{shown(scores[best])}, {of_seeds(rows[best])}; "
-        f"by the whole interval of the difference on the same sites {named(above)} above planting, {named(beat)} above "
-        "100."
+    alike = [
+        method
+        for method in trained
+        if method != best and len(rows[method]) > 1 and not is_above(rows[best], rows[method])
+    ]
+
+    def above(other):
+        return [method for method in trained if is_above(rows[method], other)]
+
+    below = [method for method in trained if is_below(rows[method], rows[PLANTING])]
+    plans = (
+        f"Plans that look at nothing: 100 stems a year, half of them conifers, score {known[PLANTING]:.0f}, 100 "
+        f"deciduous trees a year {shown(main_results.scores(deciduous))}. All constant plans together have a gain "
+        f"hypervolume of {front_of_plans(results, env_id):.2f}."
+    )
+    ahead = (
+        f"Of {len(trained)} trained method{'s' if len(trained) > 1 else ''} {methods.title(*best)} scores highest, "
+        f"{shown(scores[best])} with {of_seeds(rows[best])}"
+    )
+    ahead += f", not told apart from {listed(titles_of(alike))}." if alike else "."
+    ahead += (
+        f" It scores {points(rows[best], deciduous, best_plans)} more than 100 deciduous trees a year. "
+        "By the interval of the difference on the same sites "
+        f"{named(above(best_plans))} above 100, {named(above(rows[PLANTING]))} above planting half and half, "
+        f"{named(below)} below that."
     )
     few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]
     if few:
-        text += f" Few training seeds: {listed([f'{methods.title(*method)} {len(rows[method])}' for method in few])}."
+        ahead += f" Few training seeds: {listed([f'{methods.title(*method)} {len(rows[method])}' for method in few])}."
     lacking = [methods.title(script) for script in methods.LEARNERS if (script, "") not in known]
-    text += f" Not run yet: {listed(lacking)}." if lacking else ""
-    followed = {
-        method: main_results.row_of_runs((method[0], env_id, "default"), rows[method])
-        for method in trained
-        if method[0] in methods.LEARNERS and len(rows[method]) >= FEWEST_SEEDS
-    }
-    if not followed:
-        text += f" Whether a method follows the preference is said from {FEWEST_SEEDS} training seeds on."
-        return wrapped(text)
-    carbon = [method for method, row in followed.items() if row["carbon_change_low"] > 0.0]
-    thaw = [method for method, row in followed.items() if row["thaw_change_high"] < 0.0]
-    text += (
-        f" Asked for carbon instead of thaw, {named(carbon, 'store')} more carbon for it; asked for thaw instead of "
-        f"carbon, {named(thaw, 'keep')} more cold in the ground (intervals over training seeds without 0)."
+    ahead += f" Not run yet: {listed(lacking)}." if lacking else ""
+    followed = following(env_id, {method: rows[method] for method in trained if len(rows[method]) >= FEWEST_SEEDS})
+    return f"- **`{env_id}`**\n" + "".join(
+        wrapped(f"  - {point[0].upper()}{point[1:]}") for point in (plans, ahead, followed)
     )
-    return wrapped(text)
+
+
+def following(env_id: str, rows: dict[tuple[str, str], list]) -> str:
+    """Which methods follow the preference, by intervals over training seeds."""
+    if not rows:
+        return f"Whether a method follows the preference is said from {FEWEST_SEEDS} training seeds on."
+    changes = {
+        method: main_results.row_of_runs((method[0], env_id, "default"), replicates)
+        for method, replicates in rows.items()
+    }
+    carbon = [method for method, row in changes.items() if row["carbon_change_low"] > 0.0]
+    thaw = [method for method, row in changes.items() if row["thaw_change_high"] < 0.0]
+    against = [method for method, row in changes.items() if row["thaw_change_low"] > 0.0]
+    text = (
+        f"Asked for carbon instead of thaw, {named(carbon, 'store')} more carbon for it. Asked for thaw instead of "
+        f"carbon, {named(thaw, 'keep')} more cold in the ground"
+    )
+    text += f", and {named(against, 'keep')} less." if against else "."
+    unmoved = [method for method, row in changes.items() if np.isnan(row["carbon_change"])]
+    text += f" {named(unmoved, 'do')} the same whatever is asked for." if unmoved else ""
+    return f"{text} (By intervals over training seeds that lack 0.)"
 
 
 def wrapped(text: str) -> str:
     """A point of a list, as the documents' lines are."""
-    return textwrap.fill(text, 120, subsequent_indent="  ", break_on_hyphens=False) + "\n"
+    return textwrap.fill(text, 120, subsequent_indent="    ", break_on_hyphens=False) + "\n"
 
 
 def of_seeds(replicates: list) -> str:
@@ -137,7 +190,10 @@ def named(its_methods: list[tuple[str, str]], verb: str = "") -> str:
     """Titles of methods as the subject of a sentence."""
     if not its_methods:
         return "none " + (f"{verb}s" if verb else "is")
-    titles = [methods.title(*method) for method in its_methods]
-    words = listed(titles)
-    plural = len(titles) > 1
-    return f"{words} " + ((verb if plural else f"{verb}s") if verb else ("are" if plural else "is"))
+    of_one, of_several = {"": ("is", "are"), "do": ("does", "do")}.get(verb, (f"{verb}s", verb))
+    return f"{listed(titles_of(its_methods))} {of_one if len(its_methods) == 1 else of_several}"
+
+
+def titles_of(its_methods: list[tuple[str, str]]) -> list[str]:
+    """Their titles."""
+    return [methods.title(*method) for method in its_methods]

@@ -48,10 +48,10 @@ def test_an_environment_has_the_returns_of_its_objectives():
     three = three.assign(thaw_return=[0.0, 1.0, 0.0], timber_return=[0.0, 3.0, 0.0])
     both = pd.concat([two, three], ignore_index=True)
     assert "timber_return" not in constant_plans.of_environment(both, "two")
-    best = constant_plans.as_evaluation(constant_plans.of_environment(both, "two"), (0.0, 1.0), best=True)
+    best = constant_plans.as_evaluation(constant_plans.of_environment(both, "two"), (0.0, 1.0))
     assert best.action.tolist() == [24, 12] and best.preference.tolist() == [0.0, 1.0]
     weights = ((1.0, 0.0, 0.0), (0.0, 0.5, 0.5))
-    best = constant_plans.as_evaluation(constant_plans.of_environment(both, "three"), weights, best=True)
+    best = constant_plans.as_evaluation(constant_plans.of_environment(both, "three"), weights)
     assert best.action.tolist() == [22, 24] and best.scalarized_return.tolist() == [1.0, 2.0]
-    dense = constant_plans.as_evaluation(constant_plans.of_environment(both, "three"), weights, best=False)
+    dense = constant_plans.as_evaluation(constant_plans.of_environment(both, "three"), weights, constant_plans.CONIFERS)
     assert dense.action.tolist() == [24, 24] and dense.weight_timber.tolist() == [0.0, 0.5]

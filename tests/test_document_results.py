@@ -83,7 +83,7 @@ def test_every_section_without_runs_names_a_command(tmp_path, monkeypatch):
     need_none = {"speed", "shares", "towers", "misses", "six_rows", "boreal_map", "scaling", "region_killed", "splits"}
     for name in names - need_none:
         assert re.search(r"[Nn]ot (run|timed) yet: `python analysis/", document_results.section(results, name)), name
-    assert document_results.section(results, "six_rows").count("not run yet") == len(main_points.SIX)
+    assert document_results.section(results, "six_rows").count("not run yet") == len(main_points.LEARNED)
 
 
 def test_a_figure_is_shown_once_it_is_drawn(tmp_path, monkeypatch):

@@ -10,32 +10,43 @@ from analysis import main_points
 from analysis.tables import main_results
 
 WORLD = main_points.WORLDS[0]
-SCORES = {"plus_100": 70.0, "eupg_var_lambda": 60.0, "ppo_gated": 80.0, "ppo_group": 110.0, "moea": 65.0, "best": 100.0}
+TRAINED = {"eupg_var_lambda": 60.0, "ppo_gated": 80.0, "ppo_group": 110.0, "moea": 65.0}
+SCORES = {"plus_100": 70.0, **TRAINED, "deciduous": 95.0, "best": 100.0}
+PLANS = {main_points.BEST_PLAN: "best", main_points.DECIDUOUS: "deciduous"}
 
 
 @pytest.fixture
 def results(monkeypatch):
     """Rows of one world, a replicate being the script's name; two of the three trained follow one objective."""
-    rows = {(script, WORLD, "vectorization=lockstep"): [script] * 5 for script in SCORES if script != "best"}
+    rows = {(script, WORLD, "vectorization=lockstep"): [script] * 5 for script in ("plus_100", *TRAINED)}
     rows |= {
         ("ppo_gated", WORLD, "ent_coef=0.0, vectorization=lockstep"): ["ppo_group"],
         ("ppo_curriculum", WORLD, "default"): [],
         ("moea", WORLD, "algorithm=moead, vectorization=lockstep"): ["ppo_gated"],
     }
-    changes = {"eupg_var_lambda": (-1.0, 1.0), "ppo_gated": (0.5, 0.1), "ppo_group": (0.5, -0.1)}
+    changes = {
+        "eupg_var_lambda": (np.nan, np.nan, np.nan, np.nan),
+        "ppo_gated": (0.6, 0.5, 0.1, 0.2),
+        "ppo_group": (0.6, 0.5, -0.2, -0.1),
+        "moea": (0.0, -0.5, -0.2, 0.2),
+    }
 
     def scores(replicates):
         value = SCORES[replicates[0]]
         return {"score_greedy": value, "score_greedy_low": value - 5.0, "score_greedy_high": value + 5.0}
 
     def row_of_runs(key, replicates):
-        return dict(zip(("carbon_change_low", "thaw_change_high"), changes[key[0]], strict=True))
+        names = ("carbon_change", "carbon_change_low", "thaw_change_low", "thaw_change_high")
+        return dict(zip(names, changes[key[0]], strict=True))
 
-    plans = {(main_points.BEST_PLAN, env_id, "default"): ["best"] for env_id in main_points.WORLDS}
+    plans = {(name, env_id, "default"): [PLANS[name]] for name in PLANS for env_id in main_points.WORLDS}
     monkeypatch.setattr(main_results, "scores", scores)
     monkeypatch.setattr(main_results, "row_of_runs", row_of_runs)
     monkeypatch.setattr(main_results, "constant_plans", lambda results: plans)
-    monkeypatch.setattr(main_points, "beats", lambda one, other: SCORES[one[0]] > SCORES[other[0]])
+    monkeypatch.setattr(main_points, "is_above", lambda one, other: SCORES[one[0]] > SCORES[other[0]] + 20)
+    monkeypatch.setattr(main_points, "is_below", lambda one, other: SCORES[one[0]] < SCORES[other[0]] - 5)
+    monkeypatch.setattr(main_points, "points", lambda one, other, best: f"{SCORES[one[0]] - SCORES[other[0]]:.1f}")
+    monkeypatch.setattr(main_points, "front_of_plans", lambda results, env_id: 3.0)
     return SimpleNamespace(rows_of_two_objectives=lambda: rows)
 
 
@@ -43,8 +54,8 @@ def test_six_rows(results):
     lines = main_points.six_rows(results).splitlines()
     assert lines[0] == "| method | training seeds | `boreal-balanced-v0` | `boreal-generalist-v0` |"
     assert lines[2:] == [
-        "| the best constant plan of each preference | | 100 [95, 105] | 100 [95, 105] |",
-        "| +100 a year |  | 70 [65, 75] |  |",
+        "| +100 a year | | 70 [65, 75] |  |",
+        "| 100 deciduous trees a year | | 95 [90, 100] | 95 [90, 100] |",
         "| Variable λ EUPG | 5 | 60 [55, 65] |  |",
         "| PPO Gated | 5 | 80 [75, 85] |  |",
         "| Curriculum PPO | not run yet |  |  |",
@@ -61,13 +72,20 @@ def test_the_score_of_a_single_training_is_not_shown(results):
 
 def test_the_words_follow_from_the_numbers(results):
     assert " ".join(main_points.in_words(results).split()) == (
-        "- **`boreal-balanced-v0`.** Planting 100 stems a year without looking scores 70. The best of 5 trained "
-        "methods is Group PPO with 110 [105, 115], 5 training seeds; by the whole interval of the difference on the "
-        "same sites PPO Gated, Group PPO and MOEA/D are above planting, Group PPO is above 100. Few training seeds: "
-        "MOEA/D 1. Not run yet: Curriculum PPO. "
-        "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it; asked for thaw instead of "
-        "carbon, Group PPO keeps more cold in the ground (intervals over training seeds without 0)."
+        "- **`boreal-balanced-v0`** - Plans that look at nothing: 100 stems a year, half of them conifers, score 70, "
+        "100 deciduous trees a year 95 [90, 100]. All constant plans together have a gain hypervolume of 3.00. - Of 5"
+        " trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds. It scores 15.0 more than "
+        "100 deciduous trees a year. By the interval of the difference on the same sites none is above 100, Group PPO"
+        " is above planting half and half, Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run yet: "
+        "Curriculum PPO. - Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. Asked "
+        "for thaw instead of carbon, Group PPO keeps more cold in the ground, and PPO Gated keeps less. Variable λ "
+        "EUPG does the same whatever is asked for. (By intervals over training seeds that lack 0.)"
     )
+
+
+def test_methods_that_are_not_told_apart_from_the_best_are_named(results, monkeypatch):
+    monkeypatch.setattr(main_points, "is_above", lambda one, other: SCORES[one[0]] > SCORES[other[0]] + 40)
+    assert "not told apart from PPO Gated. It" in " ".join(main_points.in_words(results).split())
 
 
 def replicates(*shifts):
@@ -79,17 +97,21 @@ def replicates(*shifts):
     ]
 
 
-def test_a_method_is_above_another_by_all_of_its_interval_on_the_same_sites():
+def test_a_method_is_above_or_below_another_by_all_of_its_interval_on_the_same_sites():
     fixed = replicates(0.0)
-    assert main_points.beats(replicates(0.1, 0.2, 0.3), fixed)  # sites differ by more, and cancel
-    assert not main_points.beats(replicates(-0.1, 0.5, 0.8), fixed)
-    assert not main_points.beats(replicates(0.5), fixed)  # a single training
+    ours = replicates(0.1, 0.2, 0.3)
+    assert main_points.is_above(ours, fixed) and main_points.is_below(
+        fixed * 2, ours
+    )  # sites differ by more, and cancel
+    assert not main_points.is_above(replicates(-0.1, 0.5, 0.8), fixed)
+    assert not main_points.is_above(replicates(0.5), fixed)  # a single training
+    assert main_points.points(ours, fixed, replicates(-0.5)).startswith("2.0 [1.")  # of a mean of 10
 
 
 def test_few_seeds_do_not_say_whether_the_preference_is_followed(results):
     rows = {key: found[:2] for key, found in results.rows_of_two_objectives().items() if key[0] != "ppo_gated"}
     words = " ".join(main_points.in_words(SimpleNamespace(rows_of_two_objectives=lambda: rows)).split())
-    assert "110 [105, 115], 2 training seeds;" in words and "Not run yet: PPO Gated and Curriculum PPO." in words
+    assert "110 [105, 115] with 2 training seeds" in words and "Not run yet: PPO Gated and Curriculum PPO." in words
     assert words.endswith("Whether a method follows the preference is said from 5 training seeds on.")
 
 

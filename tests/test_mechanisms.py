@@ -39,12 +39,12 @@ def test_constant_plans_as_an_evaluation():
             "thaw_return": [-3.0, -1.0, 0.0, 2.0],
         }
     )
-    best = constant_plans.as_evaluation(plans, evaluation_weights(2), best=True)
+    best = constant_plans.as_evaluation(plans, evaluation_weights(2))
     # conifers 3 w - 2 (1 - w), deciduous w + (1 - w): equal at w = 0.6
     chosen = best.groupby("preference").action.first()
     assert chosen.tolist() == [20, 20, 20, 24, 24]
     assert best[best.preference == 1].scalarized_return.tolist() == [2, 4]
-    dense = constant_plans.as_evaluation(plans, evaluation_weights(2), best=False)
+    dense = constant_plans.as_evaluation(plans, evaluation_weights(2), constant_plans.CONIFERS)
     assert (dense.action == 24).all() and len(dense) == 2 * len(evaluation_weights(2))
 
 

@@ -57,7 +57,7 @@ def learnt(evidence, weight: float) -> pd.Series:
 def attainable(evidence, weight: float) -> float:
     """What the best constant plan for the weight has over random valid actions."""
     plans = evidence.study("constant_plans")
-    best = as_evaluation(of_environment(plans, GENERALIST), (weight,), best=True)
+    best = as_evaluation(of_environment(plans, GENERALIST), (weight,))
     return less_random(evidence, best, OBJECTIVE[weight])
 
 

@@ -26,7 +26,7 @@ from sim.task.preference import check_weights
 
 ENVIRONMENTS = (experiments.GENERALIST, experiments.BALANCED)
 MORE = ("boreal-timber-v0", "boreal-four-v0", "boreal-warming-v0")  # measured on first use: their returns do not ship
-DENSE_CONIFER = 24
+CONIFERS, DECIDUOUS = 24, 20  # actions that plant 100 trees of one kind
 
 
 @dataclass
@@ -78,17 +78,17 @@ def of_environment(plans: pd.DataFrame, env_id: str) -> pd.DataFrame:
     return plans[plans.env_id == env_id].dropna(axis="columns", how="all")
 
 
-def as_evaluation(plans: pd.DataFrame, weights, best: bool) -> pd.DataFrame:
-    """Rows `of_environment` as an evaluation: dense conifer, or at each weight the best plan.
+def as_evaluation(plans: pd.DataFrame, weights, action: int | None = None) -> pd.DataFrame:
+    """Rows `of_environment` as an evaluation: of an action every year, or of the best plan at each weight.
 
-    weights : as flags have them. The best is chosen on the very episodes that it is reported on, which flatters it a
-    little.
+    weights : as flags have them; action : None for the best, which is chosen on the very episodes that it is reported
+    on: that flatters it a little.
     """
     objectives = metrics.objectives_of(plans.columns)
     weights = np.array([check_weights(value, len(objectives)) for value in weights])
-    if best:
+    if action is None:
         return score.best_constant_plans(plans.assign(plan=plans.action.astype(str)), weights)
-    return score.at_weights(plans[plans.action == DENSE_CONIFER], weights)
+    return score.at_weights(plans[plans.action == action], weights)
 
 
 def main(args: Args) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.studies.constant_plans import ENVIRONMENTS, as_evaluation
+from analysis.studies.constant_plans import CONIFERS, DECIDUOUS, ENVIRONMENTS, as_evaluation
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 from cleanrl_style import protocol
 from cleanrl_style.protocol.evaluation import PRIMARY
@@ -18,10 +18,11 @@ from cleanrl_style.protocol.fronts import evaluation_weights
 
 TITLE = "Main results"
 MADE_BY = "python analysis/reproduce.py --only main"
-#: Rows of plans that look at nothing: name -> title, and whether it is the best plan of each weight.
+#: Rows of plans that look at nothing: name -> title, and the action every year; None: the best of each weight.
 CONSTANT_PLANS = {
-    "dense_conifer": ("100 conifers a year", False),
-    "best_constant_mix": ("best constant plan of each weight", True),
+    "dense_conifer": ("100 conifers a year", CONIFERS),
+    "dense_deciduous": ("100 deciduous trees a year", DECIDUOUS),
+    "best_constant_mix": ("best constant plan of each weight", None),
 }
 COLUMNS = ROW_COLUMNS | {
     "primary": "primary",
@@ -161,13 +162,13 @@ def constant_plans(results, env_ids=ENVIRONMENTS) -> dict[tuple, list]:
     """Rows of the constant plans: (name, environment, setting) -> its evaluation, as a replicate without a run."""
     rows = {}
     for env_id in env_ids:
-        for name, (_, best) in CONSTANT_PLANS.items():
+        for name, (_, action) in CONSTANT_PLANS.items():
             key = name, env_id, "default"
             rows[key] = []
             plans = results.constant_plans_in(env_id, "asymmetric", None)
-            if plans is not None:
+            if plans is not None and (action is None or (plans.action == action).any()):
                 number = len(metrics.objectives_of(plans.columns))
-                evaluation = as_evaluation(plans, evaluation_weights(number), best)
+                evaluation = as_evaluation(plans, evaluation_weights(number), action)
                 rows[key] = [results.replicate([], dict.fromkeys(protocol.POLICIES, evaluation), PRIMARY, env_id)]
     return rows
 
