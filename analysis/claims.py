@@ -74,7 +74,7 @@ agree; what a method can do, what comes out ahead, and which way a mechanism wor
 says why, as far as an experiment tells.
 
 **Numbers.** Ours are interquartile means over training seeds with 95 % bootstrap intervals, of the policy that the runs
-name primary (greedy; sampled in runs of before it was) on the same evaluation sites and weathers; differences between
+name primary, the greedy one, on the same evaluation sites and weathers; differences between
 methods are paired by seed. Returns are sums over 50 years; gains are returns less those of zero change on the same
 episodes. What is over sites or episodes is a mean with its 95 % t interval, a correlation with Fisher's, a share with
 Wilson's, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where

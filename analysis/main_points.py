@@ -134,9 +134,9 @@ def paragraph(results, env_id: str) -> str:
     )
     ahead += f", not told apart from {listed(titles_of(alike))}." if alike else "."
     ahead += (
-        f" It scores {points(rows[best], deciduous, best_plans)} more than 100 deciduous trees a year. "
+        f" Its score less that of 100 deciduous trees a year is {points(rows[best], deciduous, best_plans)}. "
         "By the interval of the difference on the same sites "
-        f"{named(above(best_plans))} above 100, {named(above(rows[PLANTING]))} above planting half and half, "
+        f"{named(above(best_plans))} above 100; {named(above(rows[PLANTING]))} above planting half and half; "
         f"{named(below)} below that."
     )
     few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]

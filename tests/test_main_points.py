@@ -74,18 +74,18 @@ def test_the_words_follow_from_the_numbers(results):
     assert " ".join(main_points.in_words(results).split()) == (
         "- **`boreal-balanced-v0`** - Plans that look at nothing: 100 stems a year, half of them conifers, score 70, "
         "100 deciduous trees a year 95 [90, 100]. All constant plans together have a gain hypervolume of 3.00. - Of 5"
-        " trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds. It scores 15.0 more than "
-        "100 deciduous trees a year. By the interval of the difference on the same sites none is above 100, Group PPO"
-        " is above planting half and half, Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run yet: "
-        "Curriculum PPO. - Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. Asked "
-        "for thaw instead of carbon, Group PPO keeps more cold in the ground, and PPO Gated keeps less. Variable λ "
-        "EUPG does the same whatever is asked for. (By intervals over training seeds that lack 0.)"
+        " trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds. Its score less that of 100 "
+        "deciduous trees a year is 15.0. By the interval of the difference on the same sites none is above 100; Group"
+        " PPO is above planting half and half; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run "
+        "yet: Curriculum PPO. - Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. "
+        "Asked for thaw instead of carbon, Group PPO keeps more cold in the ground, and PPO Gated keeps less. "
+        "Variable λ EUPG does the same whatever is asked for. (By intervals over training seeds that lack 0.)"
     )
 
 
 def test_methods_that_are_not_told_apart_from_the_best_are_named(results, monkeypatch):
     monkeypatch.setattr(main_points, "is_above", lambda one, other: SCORES[one[0]] > SCORES[other[0]] + 40)
-    assert "not told apart from PPO Gated. It" in " ".join(main_points.in_words(results).split())
+    assert "not told apart from PPO Gated. Its" in " ".join(main_points.in_words(results).split())
 
 
 def replicates(*shifts):

@@ -271,7 +271,7 @@ done. What was measured:
 {defaults}
 
 The tables below give how far each factor moves these: the measure at the high value less that at the low one.
-Constants stop at their physical limits and half way to a constant that they have to stay below; then the step is
+A constant is not moved past its physical limit, nor more than half way to another that must stay larger; then the step is
 smaller, as the two columns show; an empty cell is the default. Where zero is arbitrary, {SHARE:.0%} would mean nothing
 and the step (for the constants of that unit, or whose name begins so) is
 {spans}.
@@ -281,7 +281,8 @@ parameters and constants with constants.
 
 Where the thaw reward is clipped at -1 in every year, as at one of the four sites, its effects are nearly zero,
 and means over sites are smaller for it. Nothing burned in the one weather: zeros of fire's parameters say nothing about
-how much they matter. There are no error estimates: read sizes and ranks, not second digits.
+how much they matter. There are no error estimates: read sizes, not second digits, and no ranks of `species_thaw`, which
+differs more between sites and dice than by most factors.
 
 ## Alternatives
 

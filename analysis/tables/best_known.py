@@ -19,8 +19,13 @@ from cleanrl_style.protocol.score import by_weight
 TITLE = "Share of the best known plans"
 MADE_BY = "python analysis/best_plans.py"
 WEIGHTS = evaluation_weights(2)
-NOTHING = "12 12 12 12 12"
-CONSTANT = "best_constant_of_site"
+NOTHING, DECIDUOUS = "12 12 12 12 12", "20 20 20 20 20"
+#: Rows of plans that look at nothing: name -> title.
+BLIND = {
+    "dense_deciduous": "100 deciduous trees a year",
+    "best_constant_mix": "the best constant plan of each weight",
+    "best_constant_of_site": "the best constant plan of each site",
+}
 COLUMNS = ROW_COLUMNS | {
     "policy": "policy",
     "sites": "sites",
@@ -80,10 +85,20 @@ def rows_of(results, env_id: str, plans: pd.DataFrame) -> list[dict]:
         for key, policy in dict.fromkeys(name[:2] for name in found):
             of_row = pd.DataFrame([numbers[name] for name in found if name[:2] == (key, policy)])
             rows.append(row_of(key, len(of_row)) | {"policy": policy, "sites": len(seeds)} | over_seeds(of_row))
-    blind = best_at(constant, WEIGHTS).mean() / best.mean()
-    row = row_of((CONSTANT, env_id, "default"), np.nan) | {"sites": len(seeds)}
-    row |= {f"share_{weight:g}": 100 * value for weight, value in blind.items()}
-    return [*rows, row | {"share": 100 * best_at(constant, WEIGHTS).mean().mean() / best.mean().mean()}]
+    for name, gained in of_blind_plans(constant).items():
+        row = row_of((name, env_id, "default"), np.nan) | {"sites": len(seeds)}
+        row |= {f"share_{weight:g}": 100 * gained[weight] / best[weight].mean() for weight in WEIGHTS}
+        rows.append(row | {"share": 100 * gained.mean() / best.mean().mean()})
+    return rows
+
+
+def of_blind_plans(constant: pd.DataFrame) -> dict[str, pd.Series]:
+    """Gain at each weight of the rows `BLIND`, mean over sites; constant : gains of the constant plans there."""
+    returns = constant[metrics.return_columns(PAIR)].to_numpy()
+    gained = pd.DataFrame({weight: returns @ metrics.pair(weight) for weight in WEIGHTS})
+    of_plans = gained.groupby(constant.plan.to_numpy()).mean()
+    means = (of_plans.loc[DECIDUOUS], of_plans.max(), best_at(constant, WEIGHTS).mean())
+    return dict(zip(BLIND, means, strict=True))
 
 
 def make(results) -> pd.DataFrame:
