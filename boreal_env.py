@@ -27,7 +27,7 @@ from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS, as_array
 from sim.parameters import brief, check_name, check_overrides, check_seed
 from sim.stands import check_threads, positive_integer
-from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions
+from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions, where_valid
 from sim.task.episodes import (
     BALANCED_WORLD,
     DEFAULT_YEARS,
@@ -97,6 +97,7 @@ __all__ = [
     "sample_site_observations",
     "thaw_reward",
     "valid_actions",
+    "where_valid",
     "warm_up",
 ]
 
@@ -441,6 +442,7 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
 
     def weights(self) -> np.ndarray:
         """The preference of every episode that is under way, as weights (num_envs, m)."""
+        self._episodes.check_begun("weights")
         return self._episodes.weights.copy()
 
     def stable_baselines3(self):

@@ -6,6 +6,8 @@ first's), `seed` (of the episode: the same seed is the same site and weather und
 `<objective>_return` of each objective. All are maximised; a set of points is an array (n, m).
 """
 
+import bisect
+
 import numpy as np
 import pandas as pd
 import scipy  # loads scipy.stats when it is first used
@@ -255,10 +257,13 @@ def seeds_to_tell(values: np.ndarray, difference: float = 0.1, power: float = 0.
     if len(values) < 2:
         return np.nan
     deviation = values.std(ddof=1)
-    for seeds in range(2, 10_000):
-        if deviation == 0:
-            return seeds
+    if deviation == 0:
+        return 2
+
+    def is_enough(seeds):
         freedom, shift = 2 * seeds - 2, difference / deviation * np.sqrt(seeds / 2)
-        if scipy.stats.nct.sf(scipy.stats.t.ppf(0.975, freedom), freedom, shift) >= power:
-            return seeds
-    return np.inf
+        return scipy.stats.nct.sf(scipy.stats.t.ppf(0.975, freedom), freedom, shift) >= power
+
+    candidates = range(2, 10_000)
+    found = bisect.bisect_left(candidates, True, key=is_enough)  # power grows with seeds
+    return candidates[found] if found < len(candidates) else np.inf

@@ -117,6 +117,7 @@ def write(folder: Path, text: str, figures: dict[str, bytes]) -> None:
 
 
 def main(args: Args) -> None:
+    """Play what is compared with observations, and write the page."""
     for name, fewest in FEWEST.items():
         if getattr(args, name) < fewest:
             given = getattr(args, name)

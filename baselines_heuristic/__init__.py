@@ -39,13 +39,13 @@ def obeying(policy):
     """
     import numpy as np
 
-    from boreal_env import NO_CHANGE
+    from boreal_env import where_valid
 
     def probabilities(observations, masks, accrued_returns=None):
         chosen = policy(observations, masks)
         if chosen.ndim == 2:
             return chosen
-        return np.eye(25)[np.where(np.take_along_axis(masks, chosen[:, None], 1)[:, 0], chosen, NO_CHANGE)]
+        return np.eye(25)[where_valid(chosen, masks)]
 
     return probabilities
 

@@ -156,7 +156,6 @@ def eupg_loss(agent, x, mask, action, utility):
 if __name__ == "__main__":
     if args.scalarization == "chebyshev" and args.utility == "future":
         protocol.fail("--utility future is for --scalarization linear; for chebyshev total is allowed")
-    args.eval_weights = (args.preference,)
     task = protocol.make_task(args, preference=args.preference, hide_site=args.hide_site)
     episode_columns = task.episode_columns
     update_columns = (

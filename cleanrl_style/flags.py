@@ -245,7 +245,7 @@ def check_episodes(args) -> None:
     """End the script with one line for more episodes than there are sites to evaluate on, each of which has one."""
     if getattr(args, "eval_episodes", 0) <= TEST_SITES or getattr(args, "site_seed", None) is not None:
         return
-    env_id, mode = args.env_id, args.mode
+    env_id, mode = getattr(args, "env_id", None), getattr(args, "mode", None)
     if env_id is not None and ":" not in env_id:
         import gymnasium as gym
 

@@ -224,7 +224,8 @@ if __name__ == "__main__":
         protocol.fail(f"--total-timesteps {args.total_timesteps}: at least {steps_a_generation}, a generation")
     update_columns = ("generation", "global_step", "front_size", "gain_hypervolume", "mean_best_gain")
 
-    with protocol.Run(args, task, Path(__file__).stem, episodes=task.episode_columns, updates=update_columns) as run:
+    tables = {"episodes": task.episode_columns, "updates": update_columns}
+    with protocol.Run(args, task, Path(__file__).stem, plays_validation=False, **tables) as run:
         # TRY NOT TO MODIFY: seeding
         random.seed(args.seed)
         np.random.seed(args.seed)
@@ -256,9 +257,7 @@ if __name__ == "__main__":
             first_generation, global_step, episode = len(told) + 1, state["global_step"], state["episode"]
             for _, gains in told:
                 tell(algorithm, algorithm.ask(), gains)
-        progress = protocol.Progress(
-            "search", num_generations * steps_a_generation, "steps", global_step, task.objectives
-        )
+        progress = run.progress(num_generations * steps_a_generation, global_step)
 
         for generation in range(first_generation, num_generations + 1):
             start = time.perf_counter()

@@ -260,3 +260,13 @@ def test_masks_of_another_number_of_objectives_are_refused():
         boreal_env.action_masks(np.zeros((1, ENTRIES)), objectives=3)
     with pytest.raises(ValueError, match="objectives: a positive integer is allowed, got 0"):
         boreal_env.action_masks(np.zeros((1, ENTRIES)), objectives=0)
+
+
+def test_an_action_that_a_mask_forbids_is_no_change():
+    masks = np.zeros((3, 25), bool)
+    masks[[0, 1], [24, 3]] = True
+    assert boreal_env.where_valid(np.array([24, 24, 3]), masks).tolist() == [
+        24,
+        boreal_env.NO_CHANGE,
+        boreal_env.NO_CHANGE,
+    ]

@@ -1,3 +1,5 @@
+import importlib.util
+
 import gymnasium as gym
 import numpy as np
 import pandas as pd
@@ -8,7 +10,7 @@ from analysis.runs import read_run
 from baselines_heuristic import conifer_restoration, plus_100, random_valid, target_density, zero_change
 from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
-from cleanrl_style.protocol import evaluation, reference
+from cleanrl_style.protocol import evaluation, reference, run_folder
 
 SCRIPTS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 
@@ -65,6 +67,12 @@ def test_run_folder(script, tmp_path):
     assert episodes.groupby(["policy", "preference"]).size().tolist() == [2] * 6
     years = pd.read_csv(tmp_path / "evaluation_years.csv")
     assert years.groupby(["policy", "preference", "year", "variable"]).size().eq(1).all()
+
+
+def test_no_torch_is_needed(monkeypatch):
+    there = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else there(name))
+    assert {*run_folder.versions()} == {"python", "numpy", "numba", "gymnasium", "pandas", "matplotlib", "moocore"}
 
 
 def test_one_simulation_stands_for_every_weight(tmp_path):

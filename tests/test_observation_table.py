@@ -290,3 +290,6 @@ def test_entries_can_be_read_in_their_unit():
         boreal_env.in_unit(observations, "densities")
     with pytest.raises(ValueError, match=r"shape \(n, 43\) or wider is allowed .* got \(2, 10\)"):
         boreal_env.in_unit(np.zeros((2, 10)), "density")
+    assert boreal_env.in_unit(np.full((1, 43), 0.3), "preference") == pytest.approx(0.3)
+    with pytest.raises(ValueError, match="observations of 43 entries have no 'site_latitude_deg'"):
+        boreal_env.in_unit(observations, "site_latitude_deg")

@@ -22,6 +22,7 @@ from reference_step import (
     observed_weather,
     prepare_day,
     renew_stems,
+    settled_density,
     structure,
     sun,
     take_step,
@@ -36,6 +37,7 @@ from sim.demography import AGES
 from sim.forcing import hour_angles, step_weather
 from sim.jit import uncompiled
 from sim.parameters import CONSTANTS, MECHANISMS, ORDERED_CONSTANTS, SITE_PARAMETERS
+from sim.snow import settle_snow
 from sim.state import DAILY, DAYS, DRAWS, FORCING, RECORD, STATE, block_dtype, daily_dtype
 from sim.step import simulate_step
 from sim.year import begin_year
@@ -394,3 +396,19 @@ def test_stems_at_the_end_of_a_year(crowded):
                 biomass = living[k] / (1.0 - np.array([shares[species] for species in SPECIES]))
             np.testing.assert_allclose([stems[species] for species in SPECIES], after[k], rtol=1e-9, atol=1e-9)
             assert record["mortality_kgc_m2"][k] == approx(dead, rel=1e-8)
+
+
+def test_a_day_of_settling_snow():
+    generator, lanes, steps = np.random.default_rng(1), 200, 48
+    p = {name: constant.low for name, constant in CONSTANTS.items() if name.startswith("snow_")}
+    swe, density = generator.uniform(1.0, 500.0, lanes), generator.uniform(50.0, 500.0, lanes)
+    ground, organic = generator.uniform(-40.0, 0.0, lanes), generator.uniform(-20.0, 2.0, lanes)
+    b = SimpleNamespace(
+        s=SimpleNamespace(swe=swe, snow_density=density.copy()),
+        p=SimpleNamespace(**{name: np.full(lanes, value) for name, value in p.items()}),
+        w=SimpleNamespace(ground_sum=steps * ground, organic=organic),
+    )
+    uncompiled(settle_snow)(b, steps)
+    stands = [SimpleNamespace(swe=a, snow_density=c) for a, c in zip(swe, density, strict=True)]
+    expected = [settled_density(SimpleNamespace(**p), *of) for of in zip(stands, ground, organic, strict=True)]
+    assert b.s.snow_density == approx(np.array(expected), rel=AGREEMENT)

@@ -41,6 +41,12 @@ def test_every_combination_a_seed_of_all_before_the_next(tmp_path):
     assert runs[0].command.steps == 300_000
 
 
+def test_a_sweep_over_the_one_preference_of_a_script(tmp_path):
+    script = ROOT / "cleanrl_style" / "eupg_fixed_lambda.py"
+    names = [run.folder.parent.name for run in sweep.all_runs(args(tmp_path, "1", ["preference=0.2,0.5"], script))]
+    assert names == ["boreal-generalist-v0-preference=0.2", "boreal-generalist-v0"]
+
+
 def test_finished_runs_are_skipped_and_a_table_made(tmp_path, capsys, monkeypatch):
     runs = sweep.all_runs(args(tmp_path))
     finish(runs[:-1])

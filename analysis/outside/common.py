@@ -183,7 +183,7 @@ def main(script: str, args: Args, learn: Callable, samples: bool, check: Callabl
     if check is not None:
         check(args)
     tables = {"episodes": task.episode_columns, "cost": COST_COLUMNS}
-    with protocol.Run(args, task, Path(script).stem, **tables) as run:
+    with protocol.Run(args, task, Path(script).stem, plays_validation=False, **tables) as run:
         random.seed(args.seed)
         np.random.seed(args.seed)  # noqa: NPY002, the libraries draw from it
         torch.manual_seed(args.seed)

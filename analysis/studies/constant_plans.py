@@ -56,8 +56,7 @@ def study_of_sites(seeds) -> pd.DataFrame:
             envs.reset(seed=0)  # the preference alone comes of it
             returns = np.zeros((len(actions), 2))
             for _ in range(boreal_env.DEFAULT_YEARS):
-                valid = envs.action_masks()[actions, actions]
-                _, rewards, *_ = envs.step(np.where(valid, actions, boreal_env.NO_CHANGE))
+                _, rewards, *_ = envs.step(boreal_env.where_valid(actions, envs.action_masks()))
                 returns += rewards
         tables.append(
             pd.DataFrame(

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+import boreal_env
 from analysis import paths, stored
-from analysis.studies.measure_balance import FIRST_SEED, where_valid
+from analysis.studies.measure_balance import FIRST_SEED
 from cleanrl_style import protocol
 from cleanrl_style.protocol import final_info, reference
-from sim.task.timber import Timber, countries, timber_reward
+from sim.task.timber import DISCOUNT_RATE, Timber, countries, timber_reward
 
 TASK = "boreal-four-v0"
-DISCOUNT_RATE = 0.03  # the task's
 
 
 @dataclass
@@ -40,7 +40,7 @@ def play(sites: int, years: int) -> dict[str, np.ndarray]:
     for plan in reference.PLANS:
         envs.reset(seed=[FIRST_SEED + site for site in range(sites)])
         for _ in range(years):
-            *_, infos = envs.step(where_valid(envs.action_masks(), int(plan)))
+            *_, infos = envs.step(boreal_env.where_valid(np.full(sites, int(plan)), envs.action_masks()))
         records.append([final_info(infos, site, ["years"])["years"] for site in range(sites)])
         progress.show(len(records))
     return {name: np.array([[site[name] for site in plan] for plan in records]) for name in records[0][0]}

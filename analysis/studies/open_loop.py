@@ -22,7 +22,7 @@ CANDIDATES = 400
 OBJECTIVES = ("carbon", "thaw")
 RETURNS, GAINS = ([f"{name}_{what}" for name in OBJECTIVES] for what in ("return", "gain"))
 _COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
-_HARVESTABLE = slice(2, None)  # of a species' age classes: young and older, as the environment's default has it
+_HARVESTABLE = slice(sim.demography.AGE_CLASSES.index("young"), None)  # the environment's default
 
 
 class Episodes(NamedTuple):
@@ -71,7 +71,7 @@ def play(sites, seeds, plans, *, initial=None, **arguments) -> Episodes:
     actions = np.empty(plans.shape, dtype=int)
     record = np.empty((*plans.shape, len(sim.RECORD_NAMES)))
     for year in range(plans.shape[1]):
-        actions[:, year] = _where_valid(plans[:, year], stands.stocks(everyone))
+        actions[:, year] = boreal_env.where_valid(plans[:, year], valid_actions(stands.stocks(everyone)))
         record[:, year] = stands.step(actions[:, year])
         rewards[:, year] = rewards_of_year(record[:, year], actions[:, year])
     return Episodes(rewards, actions, record, start)
@@ -97,11 +97,6 @@ def valid_actions(stocks) -> np.ndarray:
     density = stocks["density_stems_ha"]
     classes = stocks["age_classes"].reshape(len(density), 2, -1)
     return boreal_env.valid_actions(density, classes[:, :, _HARVESTABLE].sum(axis=(1, 2)))
-
-
-def _where_valid(actions, stocks) -> np.ndarray:
-    valid = valid_actions(stocks)
-    return np.where(valid[np.arange(len(actions)), actions], actions, boreal_env.NO_CHANGE)
 
 
 def seeds(site_seed: int, weather: int) -> sim.Seeds:

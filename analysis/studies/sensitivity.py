@@ -271,9 +271,9 @@ done. What was measured:
 {defaults}
 
 The tables below give how far each factor moves these: the measure at the high value less that at the low one.
-A constant is not moved past its physical limit, nor more than half way to another that must stay larger; then the step is
-smaller, as the two columns show; an empty cell is the default. Where zero is arbitrary, {SHARE:.0%} would mean nothing
-and the step (for the constants of that unit, or whose name begins so) is
+A constant is not moved past its physical limit, nor more than half way to another that must stay larger; then the step
+is smaller, as the two columns show; an empty cell is the default. Where zero is arbitrary, {SHARE:.0%} would mean
+nothing and the step (for the constants of that unit, or whose name begins so) is
 {spans}.
 The mean annual temperature follows
 the latitude, as it does when a site is sampled. A range and {SHARE:.0%} are not alike: compare parameters with

@@ -31,7 +31,7 @@ NEAR_SURFACE_M = 3.0  # near-surface permafrost, as in IPCC AR6 WGI, 9.5.2: of t
 NONE, *SCENARIOS = "none", *sim.SCENARIOS
 #: Every action but those that change nothing, and that once.
 PLANS = [a for a in range(sim.management.NUM_ACTIONS) if sim.management.decode(a)[0] or a == boreal_env.NO_CHANGE]
-THAW_DEPTH, DEEP, MEAN_AIR = "active_layer_depth_m", "deep_soil_temperature_c", "air_temperature_c"
+THAW_DEPTH, DEEP = "active_layer_depth_m", "deep_soil_temperature_c"
 #: Ground by its temperature without a scenario [degC]: the table's columns, coldest first.
 GROUND = (-np.inf, -4.0, -2.0, np.inf)
 GROUND_NAMES = ("colder than -4 °C", "of -4 to -2 °C", "warmer than -2 °C")
@@ -65,8 +65,8 @@ def play(scenario: str, sites: int, years: int, plans: list[int]) -> dict[str, n
     columns = {name: np.empty((len(actions), years)) for name in (THAW_DEPTH, DEEP)}
     rewards = np.empty((len(actions), years, 2))
     for year in range(years):
-        valid = open_loop.valid_actions(stands.stocks(np.arange(len(actions))))[np.arange(len(actions)), actions]
-        carried_out = np.where(valid, actions, boreal_env.NO_CHANGE)
+        valid = open_loop.valid_actions(stands.stocks(np.arange(len(actions))))
+        carried_out = boreal_env.where_valid(actions, valid)
         record = stands.step(carried_out)
         parts = boreal_env.rewards_of_year(record, carried_out, reward, "asymmetric")
         rewards[:, year] = np.column_stack([parts["carbon_reward"], parts["thaw_reward"]])

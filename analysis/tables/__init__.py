@@ -1,1 +1,1 @@
-"""The paper's tables, one a module: TITLE, COLUMNS (name -> heading) and `make(results)`, ours beside the paper's."""
+"""The paper's tables, one a module: COLUMNS (name -> heading) and `make(results)`, ours beside the paper's."""

@@ -16,7 +16,6 @@ from analysis.tables.common import ROW_COLUMNS, over_seeds, row_of
 from cleanrl_style.protocol.fronts import evaluation_weights
 from cleanrl_style.protocol.score import by_weight
 
-TITLE = "Share of the best known plans"
 MADE_BY = "python analysis/best_plans.py"
 WEIGHTS = evaluation_weights(2)
 NOTHING, DECIDUOUS = "12 12 12 12 12", "20 20 20 20 20"

@@ -5,7 +5,6 @@ import pandas as pd
 
 from analysis.tables.common import over_seeds, paper
 
-TITLE = "Curriculum selection"
 MADE_BY = "python analysis/reproduce.py --only main mechanisms"
 CATEGORIES = {"accepted": 1, "rejected": 0}
 NUMBERS = {"latitude_deg": "latitude", "warming_mj_m2": "warming", "cooling_mj_m2": "cooling", "thaw_return": "thaw"}

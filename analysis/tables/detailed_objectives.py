@@ -5,7 +5,6 @@ import pandas as pd
 from analysis import metrics
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
-TITLE = "Detailed objectives"
 MADE_BY = "python analysis/reproduce.py --only main"
 COLUMNS = ROW_COLUMNS | {
     "weight": "weight",

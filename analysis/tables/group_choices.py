@@ -13,7 +13,6 @@ from analysis.tables.common import over_seeds, row_of
 from analysis.tables.main_results import named
 from cleanrl_style import protocol
 
-TITLE = "Choices of Group PPO"
 SCRIPT = "ppo_group"
 EXPERIMENTS = ("group", "budgets")
 MADE_BY = "python analysis/reproduce.py --only main balanced group budgets"

@@ -15,7 +15,6 @@ from analysis.methods import LEARNERS
 from analysis.studies.mechanism_pairs import effects
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
-TITLE = "Growing-season correlations"
 MADE_BY = "python analysis/reproduce.py --only main"
 VARIABLES = {
     "thaw_return": "thaw_reward",

@@ -10,7 +10,6 @@ import pandas as pd
 from analysis import metrics
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
-TITLE = "Lambda violations"
 MADE_BY = "python analysis/reproduce.py --only main"
 COLUMNS = ROW_COLUMNS | {
     "pairs": "pairs of weights",
@@ -42,18 +41,8 @@ def make(results) -> pd.DataFrame:
     published = paper("monotonicity_violations", index_col="method").violations_percent
     details = paper("detailed_objectives").groupby("method")[["carbon_mean", "thaw_mean"]]
     details = details.apply(metrics.violations_percent)
-    names = [
-        name
-        for name in COLUMNS
-        if name
-        in (
-            "pairs",
-            "violations_percent",
-            "violations_or_ties_percent",
-            "significant_violations_percent",
-            "noise_violations_percent",
-        )
-    ]
+    kinds = ("violations", "violations_or_ties", "significant_violations", "noise_violations")
+    names = ["pairs", *(f"{kind}_percent" for kind in kinds)]
     rows = []
     for key, replicates in results.rows_of_two_objectives().items():
         if not results.is_trained(key):

@@ -5,7 +5,6 @@ import pandas as pd
 from analysis.methods import LEARNERS, STRATEGIES
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
-TITLE = "Learned strategies"
 MADE_BY = "python analysis/reproduce.py --only main"
 YEARS = {
     "density_stems_ha": "density",

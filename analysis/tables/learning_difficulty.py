@@ -10,7 +10,6 @@ from analysis import stored
 from analysis.studies.open_loop import OBJECTIVES
 from analysis.studies.signal_to_noise import CONTRASTS, EVERY, UNIFORM, YEARS, episodes_needed
 
-TITLE = "Difficulty of learning"
 MADE_BY = "python analysis/studies/variance.py && python analysis/reproduce.py --only difficulty"
 COLUMNS = {"of": "of", "quantity": "quantity", "carbon": "carbon", "thaw": "thaw"}
 GRADIENT = "EUPG's gradient, as much signal as noise"

@@ -16,7 +16,6 @@ from cleanrl_style import protocol
 from cleanrl_style.protocol.evaluation import PRIMARY
 from cleanrl_style.protocol.fronts import evaluation_weights
 
-TITLE = "Main results"
 MADE_BY = "python analysis/reproduce.py --only main"
 #: Rows of plans that look at nothing: name -> title, and the action every year; None: the best of each weight.
 CONSTANT_PLANS = {

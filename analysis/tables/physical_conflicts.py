@@ -10,7 +10,6 @@ from analysis import metrics
 from analysis.studies.mechanism_pairs import ALL_ON, PAIRS, effects
 from analysis.tables.common import paper
 
-TITLE = "Physical conflicts"
 MADE_BY = "python analysis/reproduce.py --only mechanisms"
 EFFECTS = (
     "carbon_return",

@@ -6,7 +6,6 @@ import pandas as pd
 from analysis import paths
 from analysis.tables.common import over_seeds, paper
 
-TITLE = "Runtime"
 MADE_BY = "python analysis/reproduce.py --only main site"
 COLUMNS = {"quantity": "quantity", "unit": "unit", "seeds": "runs", "ours": "ours", "paper": "paper", "source": "from"}
 TRAINED = {  # our row -> experiment, script, the paper's row

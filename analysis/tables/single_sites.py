@@ -8,7 +8,6 @@ import pandas as pd
 
 from analysis.studies import constant_plans
 
-TITLE = "Single sites"
 MADE_BY = "python analysis/reproduce.py --only main site"
 OBJECTIVES = {0.0: "thaw", 1.0: "carbon"}  # weight of carbon -> what it leaves alone
 VARIANTS = {"eupg": {}, "baseline": {"baseline": "others"}, "total": {"utility": "total"}}

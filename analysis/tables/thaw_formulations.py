@@ -6,7 +6,6 @@ from analysis import metrics
 from analysis.tables.common import over_seeds, paper
 from analysis.tables.main_results import front_metrics
 
-TITLE = "Thaw formulations"
 MADE_BY = "python analysis/reproduce.py --only main thaw"
 FORMULATIONS = {"asymmetric": "main", "contrast": "thaw", "raw_degree_days": "thaw"}  # -> experiment
 COLUMNS = {

@@ -5,7 +5,6 @@ import pandas as pd
 from analysis.tables.common import over_seeds, paper
 from analysis.tables.thaw_formulations import FORMULATIONS, replicates_of
 
-TITLE = "Warming flux by formulation"
 MADE_BY = "python analysis/reproduce.py --only main thaw"
 FLUXES = {"boundary_warming_mj_m2": "warming", "boundary_cooling_mj_m2": "cooling"}  # MJ m-2 yr-1
 COLUMNS = {

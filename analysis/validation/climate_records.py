@@ -10,8 +10,7 @@ from analysis.validation import poker_flat, towers
 from sim import radiation
 from sim.io import disaggregation
 from sim.jit import uncompiled
-from sim.parameters import CONSTANTS
-from sim.physical_constants import FREEZING_POINT_K, PSYCHROMETRIC_PER_HPA
+from sim.physical_constants import FREEZING_POINT_K
 from sim.weather import saturation_pressure, saturation_slope, sky_emissivity
 
 black_body = uncompiled(radiation.black_body)
@@ -109,13 +108,6 @@ def clear_emissivity(days: pd.DataFrame) -> pd.Series:
     air = days[["air_temperature_c", "vapour_pressure_hpa"]].dropna()
     values = [emissivity(temperature, vapour, 0.0) for temperature, vapour in air.to_numpy()]
     return pd.Series(values, index=air.index).reindex(days.index)
-
-
-def equilibrium_share(air: pd.Series) -> pd.Series:
-    """Slope over slope plus psychrometer constant at temperatures in degC (Priestley and Taylor 1972)."""
-    gamma = PSYCHROMETRIC_PER_HPA * CONSTANTS["air_pressure_hpa"].low
-    slope = air.map(lambda temperature: slope_of(temperature, saturation_of(temperature)), na_action="ignore")
-    return slope / (slope + gamma)
 
 
 def harmonic_anomaly(days: np.ndarray) -> np.ndarray:

@@ -7,7 +7,6 @@ from analysis.validation import towers
 FAILED_G = 5.0  # gC m-2 month-1: a partitioning whose GPP or respiration is as negative as this has failed
 UNDISTURBED_BEFORE = 1950
 WARMEST_C = 2.0  # mean annual air temperature of a tower that is still near the sampled climate
-COLD_C = -0.5
 
 
 def carbon_fluxes() -> pd.DataFrame:

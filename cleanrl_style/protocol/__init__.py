@@ -15,7 +15,7 @@ from cleanrl_style.protocol.files import replacing
 from cleanrl_style.protocol.flat import flat_parameters
 from cleanrl_style.protocol.fronts import scalarize
 from cleanrl_style.protocol.progress import Progress
-from cleanrl_style.protocol.run_folder import FLOAT_FORMAT, TIMING_COLUMNS, Run
+from cleanrl_style.protocol.run_folder import FLOAT_FORMAT, Run
 from cleanrl_style.protocol.sites import evaluation_seeds
 from cleanrl_style.protocol.task import EPISODE_INFO, Task, final_info
 from sim.task.preference import observed_weights
@@ -28,7 +28,6 @@ __all__ = [
     "MAX_ENVS",
     "POLICIES",
     "Policy",
-    "TIMING_COLUMNS",
     "Progress",
     "Run",
     "Task",

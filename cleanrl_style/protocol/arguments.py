@@ -136,6 +136,8 @@ def fill_in(args, registered: Task) -> None:
         fail(f"--reward-scales: {number} numbers, of {names}, are allowed, not {list(args.reward_scales)}")
     if not any(getattr(args, "reward_scales", (1,))):
         fail("--reward-scales: not all of them 0, which leaves nothing to learn")
+    if hasattr(args, "preference"):  # a script with one preference is evaluated at it
+        args.eval_weights = (args.preference,)
     if getattr(args, "eval_weights", ()) is None:
         args.eval_weights = evaluation_weights(number)
     elif number != 2 and hasattr(args, "eval_weights") and np.ndim(args.eval_weights) == 1:

@@ -192,8 +192,7 @@ def measure(task: Task, seeds: list[int]) -> pd.DataFrame:
         weights = np.full((len(chunk), task.num_objectives), 1 / task.num_objectives)
 
         def policy(observations, masks, accrued_returns, actions=actions):
-            possible = masks[np.arange(len(actions)), actions]
-            return np.eye(25)[np.where(possible, actions, boreal_env.NO_CHANGE)]
+            return np.eye(25)[boreal_env.where_valid(actions, masks)]
 
         with contextlib.closing(make_envs(task, len(chunk))) as envs:
             greedy = np.ones(len(chunk), dtype=bool)

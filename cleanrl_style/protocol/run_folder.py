@@ -5,6 +5,7 @@ import contextlib
 import csv
 import hashlib
 import importlib.metadata
+import importlib.util
 import io
 import json
 import pickle
@@ -98,7 +99,8 @@ class Run:
     another run's, in use, damaged or not writable, or holds this run finished (exit 0).
     """
 
-    def __init__(self, args, task: Task, script: str, **tables):
+    def __init__(self, args, task: Task, script: str, *, plays_validation: bool = True, **tables):
+        """plays_validation : whether the script calls `validate`; tables : name -> columns."""
         self.args, self.task, self.script = args, task, script
         self.stopped = False
         changed = not_default(args)
@@ -120,7 +122,7 @@ class Run:
             self._claim_folder()
             self._load_checkpoint()
             self.first_step = self.env_step = self.checkpoint_step  # of this process, so far
-            if task.boreal and hasattr(args, "total_timesteps"):
+            if task.boreal and plays_validation and hasattr(args, "total_timesteps"):
                 course = Course(task, args.total_timesteps, args.eval_episodes, self.checkpoint_step)
                 if course.fits:
                     self.course, tables = course, {**tables, "validation": course.columns}
@@ -500,7 +502,8 @@ def folder_name(env_id: str, changed: dict) -> str:
 def versions() -> dict:
     """Versions of Python and of the packages that the numbers depend on."""
     packages = ("numpy", "numba", "gymnasium", "torch", "pandas", "matplotlib", "moocore")
-    found = {name: importlib.metadata.version(name) for name in packages}
+    there = [name for name in packages if importlib.util.find_spec(name)]  # fixed strategies do without torch
+    found = {name: importlib.metadata.version(name) for name in there}
     return {"python": platform.python_version(), **found}
 
 

@@ -41,6 +41,11 @@ def valid_actions(density: np.ndarray, harvestable: np.ndarray) -> np.ndarray:
     return np.repeat(valid, len(CONIFER_MIXES), axis=1)
 
 
+def where_valid(actions: np.ndarray, masks: np.ndarray) -> np.ndarray:
+    """Actions (n,) where masks (n, 25) allow them, `NO_CHANGE` where they do not."""
+    return np.where(masks[np.arange(len(actions)), actions], actions, NO_CHANGE)
+
+
 class MaskFunction:
     """Valid actions of observations with these entries, (n, names) -> bool (n, 25); picklable.
 

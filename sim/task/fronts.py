@@ -12,7 +12,7 @@ from numbers import Real
 
 import numpy as np
 
-from sim.task.actions import NO_CHANGE
+from sim.task.actions import where_valid
 
 FOLDER = "best_plans"
 FREE = ("observation_groups", "record_years", "record_steps", "fixed_preference")  # arguments that no return hangs on
@@ -63,13 +63,11 @@ def play_plans(envs, seed: int | None, plans: np.ndarray, years: int) -> np.ndar
     envs : a vector environment with a stand a plan.
     """
     plans = np.asarray(plans)
-    everyone, block = np.arange(len(plans)), -(-years // plans.shape[1])
+    block = -(-years // plans.shape[1])
     envs.reset(seed=[seed] * len(plans))
     rewards = []
     for year in range(years):
-        actions = plans[:, year // block]
-        possible = envs.action_masks()[everyone, actions]
-        rewards.append(envs.step(np.where(possible, actions, NO_CHANGE))[1])
+        rewards.append(envs.step(where_valid(plans[:, year // block], envs.action_masks()))[1])
     return np.stack(rewards, axis=1).astype(float)
 
 

@@ -278,11 +278,12 @@ class Reader:
     """Entries of observations in their own units again: observations (n, names) -> float64 (n, wanted); picklable."""
 
     def __init__(self, wanted: Sequence[str], names: Sequence[str] = OBSERVATION_NAMES):
-        rows = {row.name: row for row in ROWS}
+        units = {row.name: (row.shift, row.scale) for row in ROWS}
         for name in set(wanted) - set(names):
             raise ValueError(f"the observation has no entry {name!r}; OBSERVATION_NAMES of boreal_env has their names")
         self.columns = [list(names).index(name) for name in wanted]
-        self.shift, self.scale = np.array([(rows[name].shift, rows[name].scale) for name in wanted]).T
+        of_weights = 0.0, 1.0  # of as many objectives as an environment has
+        self.shift, self.scale = np.array([units.get(name, of_weights) for name in wanted]).T
 
     def __call__(self, observations: np.ndarray) -> np.ndarray:
         return observations[:, self.columns].astype(float) * self.scale - self.shift
@@ -299,7 +300,11 @@ def in_unit(observations: np.ndarray, name: str, names: Sequence[str] = OBSERVAT
             f"observations: shape (n, {least}) or wider is allowed with these names, got {np.shape(observations)}; the "
             "names of an environment's entries are its observation_names"
         )
-    return Reader((name,), names)(observations)[:, 0]
+    reader = Reader((name,), names)
+    width = np.shape(observations)[1]
+    if reader.columns[0] >= width:
+        raise ValueError(f"observations of {width} entries have no {name!r}, which is entry {reader.columns[0]}")
+    return reader(observations)[:, 0]
 
 
 def sample_site_observations(site_seeds: Sequence[int]) -> np.ndarray:

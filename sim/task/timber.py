@@ -26,8 +26,8 @@ ITEMS = (
     "roads",
 )
 
-#: m3 under bark in a m3 over bark: bark is an eighth of a stem (Lambert et al. 2005: 12 % of a spruce of 20 cm).
 SEEDLING = "seedling"  # planting alone is by it
+#: m3 under bark in a m3 over bark: bark is an eighth of a stem (Lambert et al. 2005: 12 % of a spruce of 20 cm).
 UNITS = {"m3": 1.0, "m3 under bark": 0.88, SEEDLING: 1.0}
 READ = ("item", "value", "currency", "unit", "year", "per_eur")  # columns of a table of prices that are read
 
@@ -40,6 +40,9 @@ VOLUME = {"conifer": 10.0 / (0.51 * 0.40), "deciduous": 10.0 / (0.48 * 0.43)}
 #: `analysis/studies/objective_scales.py`.
 TIMBER_SCALE = 3000.0
 
+#: Of a year, where none is given.
+DISCOUNT_RATE = 0.03
+
 #: Columns that an environment with prices adds to the annual record.
 TIMBER_COLUMNS = ("timber_m3_ha", "net_revenue_eur_ha", "discounted_revenue_eur_ha")
 
@@ -49,7 +52,7 @@ class Timber:
     columns, or a dict of `ITEMS` in EUR; discount_rate : a year's, or None. Raises ValueError naming what is wrong."""
 
     def __init__(self, timber, discount_rate):
-        self.discount_rate = 0.03 if discount_rate is None else check_discount_rate(discount_rate)
+        self.discount_rate = DISCOUNT_RATE if discount_rate is None else check_discount_rate(discount_rate)
         self.prices = read_prices(timber)
 
     def columns(self, record: dict[str, np.ndarray], year) -> dict[str, np.ndarray]:
