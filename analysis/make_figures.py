@@ -17,6 +17,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from analysis import paths
+from analysis.experiments import GENERALIST
 from analysis.figures import (
     algorithm_comparison,
     demographics,
@@ -68,7 +69,7 @@ def draw(module, results: Results) -> Figure:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=module.SIZE, layout="constrained")
         module.draw(figure, results)
-        figure.supxlabel(textwrap.fill(module.CAPTION, 140), fontsize=6)
+        figure.supxlabel(textwrap.fill(f"{GENERALIST}. {module.CAPTION}", 140), fontsize=6)
     return figure
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from analysis import metrics
 from analysis.figures.common import (
     RETURNS,
     SEEDS_95,
@@ -23,8 +24,8 @@ MADE_BY = "python analysis/reproduce.py --only main"
 SHOWN = (*LEARNERS, *STRATEGIES)
 CAPTION = (
     f"Returns are sums over 50 years. (a) {SEEDS_95}. (b) 0: doing nothing, 100: the best constant plan of each "
-    "weight; left: greedy, right: sampled; dots: seeds. (c) a point a weight, mean over seeds. (d) large: mean over "
-    "seeds, small: seeds."
+    "weight; bars: interquartile mean over seeds, left greedy, right sampled; dots: seeds. (c) a point a weight, "
+    "mean over seeds. (d) large: mean over seeds, small: seeds."
 )
 
 
@@ -44,7 +45,7 @@ def draw(figure, results) -> None:
         replicates = results.of("main", method.script)
         for offset, policy, opacity in ((-0.2, "greedy", 0.8), (0.2, "sampled", 0.4)):
             scores = [one.score_of(one.by_policy.get(policy)) for one in replicates]
-            bars.bar(k + offset, np.mean(scores), 0.38, color=method.colour, alpha=opacity)
+            bars.bar(k + offset, metrics.iqm(scores), 0.38, color=method.colour, alpha=opacity)
             bars.plot(np.full(len(scores), k + offset), scores, "o", color="black", markersize=2)
     bars.set_xticks(range(len(shown)), [method.title for method in shown], rotation=40, ha="right")
     for level in (0, 100) if shown else ():

@@ -189,7 +189,7 @@ def season_curves(ax, results) -> None:
     if len(curves) > 1 and len({len(curve) for curve in curves}) == 1:
         note = f"methods differ by at most {np.ptp(curves, axis=0).max():.1f}"
         ax.text(0.98, 0.98, note, transform=ax.transAxes, ha="right", va="top", fontsize=7)
-    finish(ax, xlabel="days above 5 °C", ylabel="thaw return (50 years)")
+    finish(ax, xlabel="days a year with a mean above 5 °C", ylabel="thaw return (50 years)")
 
 
 # ---------------------------------------------------------------------------------------------- trade-offs

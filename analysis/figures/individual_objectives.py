@@ -13,6 +13,7 @@ from analysis.figures.common import (
     legend,
     panels,
 )
+from cleanrl_style.protocol.fronts import evaluation_weights
 
 SIZE = (7, 5.2)
 MADE_BY = "python analysis/reproduce.py --only main"
@@ -32,4 +33,6 @@ def draw(figure, results) -> None:
             fronts = [metrics.mean_returns(one.evaluation)[column] for one in results.of("main", method.script)]
             band(ax, fronts[0].index, np.array(fronts), method.colour, method.title, marker=method.marker)
         finish(ax, xlabel="weight of carbon", ylabel=label)
+        if ax.has_data():
+            ax.set_xticks(evaluation_weights(2))
     legend(figure, axes)

@@ -11,10 +11,11 @@ from analysis.tables.learning_difficulty import YEAR, variance_components
 SIZE = (7, 5.8)
 MADE_BY = "python analysis/studies/variance.py && python analysis/reproduce.py --only difficulty"
 CAPTION = (
-    f"(b)-(d) one action in year {YEAR} under uniformly random valid actions, the same sites and weathers with either "
-    "action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside; an interval to the left edge reaches 0. "
-    "(d) half of the episodes have either action; dashed line: those of a training run; an interval to the right edge "
-    "has no end."
+    f"(b)-(d) one action in year {YEAR} under uniformly random valid actions, the same sites and weathers with "
+    "either action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside; an interval to the left edge "
+    "reaches 0. (d) half of the episodes have either action; dashed line: those of a training run; an interval to "
+    "the right edge has no end; diamonds: of the effect as a generalised advantage (GAE) sees it, which may have "
+    "the other sign. (b, d) Green: carbon, blue: thaw."
 )
 COMPONENTS = {
     "site": "#0072B2",

@@ -17,8 +17,8 @@ from analysis.tables.many_objectives import file_stem
 COLOURS = ("#009e73", "#0072b2", "#d55e00", "#cc79a7", "#e69f00")  # of the objectives
 EQUAL, REFERENCE = "#999999", "black"
 CAPTION = (
-    "Evaluation: mean returns over episodes and seeds at each weight. A line has the colour of the largest weight's "
-    "objective, grey where several share it."
+    "Evaluation: mean returns over episodes and training seeds (one seed: its own) at each weight. A line has the "
+    "colour of the largest weight's objective, grey where several share it."
 )
 
 STEM = "many_objectives"

@@ -15,6 +15,9 @@ PANELS = dict.fromkeys(scripts(FIXED_WEIGHT), "fixed") | dict.fromkeys(LEARNERS,
 def draw(figure, results) -> None:
     """A panel a method."""
     axes = panels(figure, -(-len(PANELS) // 2), 2, [METHODS[script].title for script in PANELS])
+    for ax in axes[1:]:  # what a method covers is seen beside the others'
+        ax.sharex(axes[0])
+        ax.sharey(axes[0])
     points = None
     for ax, (script, experiment) in zip(axes, PANELS.items(), strict=True):
         if not wanting(ax, results, experiment, script):
