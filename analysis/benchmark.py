@@ -28,6 +28,7 @@ import pandas as pd
 import boreal_env
 import sim
 from analysis.machine import machine
+from analysis.paths import make_writable
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 from cleanrl_style.protocol.hosts import split
@@ -407,10 +408,7 @@ def main(args: Args) -> None:
         protocol.fail(f"--only {unknown[0]}: allowed are {', '.join(SECTIONS)}")
     if args.repeats is not None and args.repeats < 1:
         protocol.fail(f"--repeats {args.repeats}: at least 1 is needed")
-    try:
-        args.output_dir.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
+    make_writable("--output-dir", args.output_dir)
     facts = machine()
     protocol.compile_physics(KERNELS)
     path = args.output_dir / "benchmark.csv"

@@ -82,28 +82,25 @@ def main(args: Args) -> None:
     for line in results.left_out:
         print(f"left out: {line}", file=sys.stderr)
     folder = args.figures_dir or paths.runs(args.quick) / "figures"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        not_run = []
-        for module in FIGURES:
-            figure = draw(module, results)
-            if not any(ax.has_data() for ax in figure.get_axes()):
-                remove(folder / name_of(module))
-                not_run.append(f"{name_of(module)}: {module.MADE_BY}")
-                continue
-            with matplotlib.rc_context(STYLE):
-                save(figure, folder / name_of(module))
-        others = many_objectives.figures(results)
-        for path in set(folder.glob(f"{many_objectives.STEM}_*.png")) - {folder / f"{name}.png" for name in others}:
-            remove(path)
-        for name, (size, drawing) in others.items():
-            with matplotlib.rc_context(STYLE):
-                figure = Figure(figsize=size, layout="constrained")
-                drawing(figure)
-                figure.supxlabel(textwrap.fill(many_objectives.CAPTION, int(18 * size[0])), fontsize=6)
-                save(figure, folder / name)
-    except OSError as error:
-        sys.exit(f"error: --figures-dir {folder}: cannot write there ({error.strerror})")
+    paths.make_writable("--figures-dir", folder)
+    not_run = []
+    for module in FIGURES:
+        figure = draw(module, results)
+        if not any(ax.has_data() for ax in figure.get_axes()):
+            remove(folder / name_of(module))
+            not_run.append(f"{name_of(module)}: {module.MADE_BY}")
+            continue
+        with matplotlib.rc_context(STYLE):
+            save(figure, folder / name_of(module))
+    others = many_objectives.figures(results)
+    for path in set(folder.glob(f"{many_objectives.STEM}_*.png")) - {folder / f"{name}.png" for name in others}:
+        remove(path)
+    for name, (size, drawing) in others.items():
+        with matplotlib.rc_context(STYLE):
+            figure = Figure(figsize=size, layout="constrained")
+            drawing(figure)
+            figure.supxlabel(textwrap.fill(many_objectives.CAPTION, int(18 * size[0])), fontsize=6)
+            save(figure, folder / name)
     say_what_was_not_run("figures", not_run)
     print(f"{len(FIGURES) - len(not_run) + len(others)} figures: {folder}/*.png, *.pdf")
 

@@ -114,28 +114,25 @@ def main(args: Args) -> None:
         where, first = ", ".join(map(str, results.roots)), next(job.command for job in results.missing if job.exists)
         protocol.fail(f"no finished run under {where}; `{first}` makes the first, `python analysis/reproduce.py` all")
     folder = args.tables_dir or paths.runs(args.quick) / "tables"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        not_run = []
-        for module in TABLES:
-            table = module.make(results)
-            if not has_numbers(table, module.COLUMNS):
-                remove_table(folder / name_of(module))
-                not_run.append(f"{name_of(module)}: {module.MADE_BY}")
-                continue
-            text = readable(table, module.COLUMNS)
-            write_table(folder / name_of(module), table, text)
-            if module is main_results:
-                print(f"{EXPLANATION}\n")
-                print(text.loc[(table.seeds > 0).to_numpy(), list(main_results.TERMINAL)].to_string(index=False))
-        others = many_objectives.make(results)
-        for stem in many_objectives.STEMS:
-            for path in set(folder.glob(f"{stem}_*.csv")) - {folder / f"{name}.csv" for name in others}:
-                remove_table(path)
-        for name, (table, columns) in others.items():
-            write_table(folder / name, table, readable(table, columns))
-    except OSError as error:
-        sys.exit(f"error: --tables-dir {folder}: cannot write there ({error.strerror})")
+    paths.make_writable("--tables-dir", folder)
+    not_run = []
+    for module in TABLES:
+        table = module.make(results)
+        if not has_numbers(table, module.COLUMNS):
+            remove_table(folder / name_of(module))
+            not_run.append(f"{name_of(module)}: {module.MADE_BY}")
+            continue
+        text = readable(table, module.COLUMNS)
+        write_table(folder / name_of(module), table, text)
+        if module is main_results:
+            print(f"{EXPLANATION}\n")
+            print(text.loc[(table.seeds > 0).to_numpy(), list(main_results.TERMINAL)].to_string(index=False))
+    others = many_objectives.make(results)
+    for stem in many_objectives.STEMS:
+        for path in set(folder.glob(f"{stem}_*.csv")) - {folder / f"{name}.csv" for name in others}:
+            remove_table(path)
+    for name, (table, columns) in others.items():
+        write_table(folder / name, table, readable(table, columns))
     say_what_is_missing(results)
     if any(one.gains is None for replicates in rows.values() for one in replicates):
         print("Gains need a run of baselines_heuristic/zero_change.py in the same environment, as long.")

@@ -21,6 +21,7 @@ from numba.core.dispatcher import Dispatcher
 
 from analysis.benchmark import per_step, started
 from analysis.machine import machine
+from analysis.paths import make_writable
 from cleanrl_style import protocol
 from sim.account import clear_day, end_day
 from sim.block import LANES, filled_block
@@ -179,10 +180,7 @@ def main(args: Args) -> None:
         protocol.fail(
             f"--lanes {args.lanes} --repeats {args.repeats}: 1 or {LANES} lanes, from 1 repeat on are allowed"
         )
-    try:
-        args.output_dir.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
+    make_writable("--output-dir", args.output_dir)
     print(", ".join(f"{name} {value}" for name, value in machine().items()))
     print("compiling the phases one by one, half a minute", flush=True)
     with loops_kept():

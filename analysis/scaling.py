@@ -21,6 +21,7 @@ import boreal_env
 import sim
 from analysis.benchmark import started
 from analysis.machine import machine
+from analysis.paths import make_writable
 from cleanrl_style import protocol
 from sim.spin_up import SPIN_UP_STEPS_PER_DAY, SPIN_UP_YEARS
 from sim.stands import available_cores
@@ -146,10 +147,7 @@ def main(args: Args) -> None:
         )
     if args.quick:
         args.stands, args.environments, args.repeats = (16, 64), 64, 1
-    try:
-        args.output_dir.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
+    make_writable("--output-dir", args.output_dir)
     table = run(args)
     with protocol.replacing(args.output_dir / "scaling.csv") as file:
         table.to_csv(file, index=False, float_format=protocol.FLOAT_FORMAT, lineterminator="\n")

@@ -24,6 +24,7 @@ import numpy as np
 import pandas as pd
 
 import sim
+from analysis.paths import make_writable
 from cleanrl_style import protocol
 from sim.block import LANES
 from sim.closure import TOLERANCES
@@ -482,10 +483,7 @@ def main(args: Args) -> None:
         )
         sys.exit(1 if outcome.failures else 0)
 
-    try:
-        args.output_dir.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        protocol.fail(f"--output-dir {args.output_dir}: cannot write there ({error.strerror})")
+    make_writable("--output-dir", args.output_dir)
     protocol.compile_physics([LANES])
     numbers = plan(args.stand_years)
     progress = protocol.Progress("stress", sum(map(planned_years, numbers)), "stand-years")

@@ -10,13 +10,12 @@ free, against chronosequences; field experiments; what the thaw return hangs on;
 the document is from the run that wrote it, but for the signs under every constant, which a study of its own finds.
 """
 
-import errno
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, get_args
 
+from analysis import paths
 from analysis.validation import (
     bands,
     disturbance_report,
@@ -97,15 +96,6 @@ def assemble(parts: dict[str, Part]) -> str:
     return document.fill("\n\n".join(sections)) + "\n"
 
 
-def make_writable(folder: Path) -> None:
-    """Make the folder and its images/, before anything is computed. Raises OSError if they cannot be written to."""
-    images = folder / "images"
-    images.mkdir(parents=True, exist_ok=True)
-    for path in (folder, images):
-        if not os.access(path, os.W_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-
-
 def write(folder: Path, text: str, figures: dict[str, bytes]) -> None:
     """validation.md and images/ in a folder, each file whole or not at all."""
     images = folder / "images"
@@ -126,10 +116,8 @@ def main(args: Args) -> None:
         args = replace(args, **QUICK)
     whole = set(args.parts) == set(PARTS) and not args.quick
     folder = args.output_dir or (FULL_DOCUMENT if whole else OTHERWISE)
-    try:
-        make_writable(folder)
-    except OSError as error:
-        protocol.fail(f"--output-dir {folder}: {error.strerror}; a writable folder is needed")
+    for one in (folder, folder / "images"):
+        paths.make_writable("--output-dir", one)
     parts = {}
     for name, (heading, report) in PARTS.items():
         if name in args.parts:
