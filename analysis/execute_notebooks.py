@@ -10,6 +10,10 @@ import difflib
 from dataclasses import dataclass
 from pathlib import Path
 
+from cleanrl_style.flags import require
+
+require("nbformat", "nbclient", extra="docs")
+
 import nbformat
 from nbclient import NotebookClient
 

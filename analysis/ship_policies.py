@@ -42,6 +42,8 @@ def main(args: Args) -> None:
     """Ship the policies; nothing is written unless all can be."""
     import torch
 
+    if not args.runs:
+        sys.exit("error: runs: at least one is needed")
     packed = {}
     for path in args.runs:
         try:

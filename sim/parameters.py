@@ -94,6 +94,7 @@ ORDERED_CONSTANTS = (
 
 WHOLE_CONSTANTS = ("young_age_limit", "mature_age_limit")
 
+_LOWEST, _HIGHEST = np.array([(p.physical_low, p.physical_high) for p in SITE_PARAMETERS.values()]).T
 _LATITUDE_SOUTH, _LATITUDE_RANGE = 56.0, 9.0
 _SITE_TEMPERATURE_SPREAD_C = 0.5
 
@@ -174,6 +175,19 @@ def check_overrides(overrides: dict | None) -> dict[str, tuple[float, float]]:
             raise ValueError(f"{name}: range reversed, {low:g} > {high:g}")
         checked[name] = (low, high)
     return checked
+
+
+def check_site(site) -> None:
+    """Raise ValueError for a site that has not all parameters, others, or one outside its physical limits."""
+    if not isinstance(site, dict) or site.keys() != SITE_PARAMETERS.keys():
+        for name in check_mapping("site", site):
+            _lookup(SITE_PARAMETERS, "site parameter", name)
+        missing = next(name for name in SITE_PARAMETERS if name not in site)
+        raise ValueError(f"site: {missing} is missing; sim.sample_site and sim.middle_site give all")
+    values = np.array([site[name] for name in SITE_PARAMETERS])
+    if values.dtype.kind not in "fiu" or not ((values >= _LOWEST) & (values <= _HIGHEST)).all():
+        for name, value in site.items():
+            _check_number(name, value, SITE_PARAMETERS[name])
 
 
 def check_constants(overrides: dict | None) -> dict[str, float]:

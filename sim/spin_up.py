@@ -102,7 +102,7 @@ def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:
     for name, pair in check_mapping("initial_ranges", ranges).items():
         if name not in DRAWN:
             raise ValueError(f"unknown initial range {name!r}; allowed: {', '.join(DRAWN)}")
-        if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+        if not isinstance(pair, (tuple, list, np.ndarray)) or np.shape(pair) != (2,):
             raise ValueError(f"initial range {name}: a (low, high) pair is allowed, got {pair!r}")
         low, high = (check_initial({name: value})[name] for value in pair)
         if low > high:

@@ -26,6 +26,7 @@ from sim.parameters import (
     check_mechanisms,
     check_name,
     check_overrides,
+    check_site,
     check_weather,
 )
 from sim.saved import check_array, check_keys
@@ -39,6 +40,8 @@ from sim.spin_up import (
     SPIN_UP_STEPS_PER_DAY,
     SPIN_UP_YEARS,
     boundary_in_balance,
+    check_initial,
+    check_initial_ranges,
     climate_draws,
     deep_heat_limits,
     first_state,
@@ -49,6 +52,7 @@ from sim.state import (
     DAILY,
     DAYS,
     DRAWS_SIZE,
+    FORCING,
     PARAMETER_NAMES,
     RECORD,
     RECORD_NAMES,
@@ -154,9 +158,18 @@ class Stands:
         stocks are drawn from, name -> (low, high), instead of `sim.spin_up.INITIAL_RANGES`; observed : a year's
         forcing to spin up with, instead of generated weather (a part of a year is not used).
         """
-        stands = np.atleast_1d(np.asarray(stands, dtype=int))
-        ranges = {**INITIAL_RANGES, **(initial_ranges or {})}
-        given = [(initial or {}).get(k) or {} for k in range(len(stands))]
+        stands = self._indices(stands)
+        ranges = {**INITIAL_RANGES, **check_initial_ranges(initial_ranges)}
+        given = self._given(initial, len(stands))
+        for what, values in (("sites", sites), ("seeds", seeds)):
+            if len(values) != len(stands):
+                raise ValueError(f"{what}: one for each of {len(stands)} stands is allowed, got {len(values)}")
+        for site, its_seeds in zip(sites, seeds, strict=True):
+            check_site(site)
+            if not isinstance(its_seeds, Seeds):
+                raise ValueError(f"seeds: sim.episode_seeds give them, got {brief(its_seeds)}")
+        if observed is not None:
+            check_observed(observed, len(observed))
         for k, stand in enumerate(stands):
             self.seeds[stand] = seeds[k]
             self.years[stand] = 0
@@ -243,8 +256,12 @@ class Stands:
         Returns the annual record, shape (stands, columns of `RECORD_NAMES`); with `daily`, also the daily output,
         shape (stands, days, columns of `sim.state.DAILY`).
         """
-        stands = np.arange(self.number) if stands is None else np.atleast_1d(np.asarray(stands, dtype=int))
+        stands = np.arange(self.number) if stands is None else self._indices(stands)
         actions = check_actions(actions, len(stands))
+        if positive_integer("days", days) > DAYS:
+            raise ValueError(f"days = {days}: at most {DAYS} are allowed")
+        if observed is not None:
+            check_observed(observed, days * self.steps_per_day)
         parameters = self.parameters_of_year(stands)
         for stand in stands:
             if self._weather[stand] is None:
@@ -374,6 +391,21 @@ class Stands:
             list(self._pool.map(run, chunks))
         return state, record
 
+    def _indices(self, stands) -> np.ndarray:
+        """Indices of stands, (n,). Raises ValueError for others, and for one that is there twice."""
+        found = np.atleast_1d(np.asarray(stands))
+        known = found.dtype.kind in "iu" and found.ndim == 1
+        if not known or (found < 0).any() or (found >= self.number).any() or len(set(found.tolist())) < len(found):
+            raise ValueError(f"stands: indices in [0, {self.number}), each once, are allowed, got {brief(stands)}")
+        return found
+
+    def _given(self, initial, number: int) -> list[dict]:
+        """First stocks of so many stands. Raises ValueError for those of another, and for bad ones."""
+        for position in initial or {}:
+            if position not in range(number):
+                raise ValueError(f"initial: positions in [0, {number}) are allowed, got {position!r}")
+        return [check_initial((initial or {}).get(k)) for k in range(number)]
+
     def _draw(self, stands) -> np.ndarray:
         """The random numbers of the stands' next year, (stands, fields)."""
         return np.array([draw_year(self._weather[stand], self._disturbance[stand]) for stand in stands])
@@ -420,6 +452,13 @@ def positive_integer(name, value) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 1:
         raise ValueError(f"{name}: a positive integer is allowed, got {value!r}")
     return int(value)
+
+
+def check_observed(observed, steps: int) -> None:
+    """Raise ValueError for what is no forcing of so many steps."""
+    shape, kind = np.shape(observed), np.asarray(observed).dtype.kind
+    if shape != (steps, len(FORCING)) or kind != "f" or not np.isfinite(observed).all():
+        raise ValueError(f"observed: finite numbers of shape {(steps, len(FORCING))} are allowed, got shape {shape}")
 
 
 def check_threads(threads) -> int:

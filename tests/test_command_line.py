@@ -1,5 +1,7 @@
 """`python -m boreal_env`, policies by name, and the commands that ship and score them."""
 
+import pickle
+import re
 import shutil
 import subprocess
 import sys
@@ -86,14 +88,27 @@ def test_a_policy_is_watched(shipped, tmp_path, capsys, monkeypatch):
     assert "carbon weight 0.30: return" in out and "doing nothing" in out and ": 4 years" in out
 
 
-def test_what_shows_other_years_has_another_name():
-    def name(*given):
-        args = command_line.arguments(["watch", "ppo_group", *given])
-        return command_line.name_of_animation(args, "ppo_group", "pond:pond-v0", np.array(args.preference))
+def test_what_shows_other_years_has_another_name(run):
+    def name(*given, policy="ppo_group"):
+        args = command_line.arguments(["watch", str(policy), *given])
+        loaded = protocol.load_policy(policy)
+        return command_line.name_of_animation(args, loaded, "pond:pond-v0", np.array(args.preference))
 
     assert name("--preference", "0.3", "0.7") == "ppo_group-pond-v0-preference0.3-seed0.gif"
     others = ([], ["--seed", "1"], ["--site-seed", "1"], ["--sampled"], ["--site-seed", "1", "--seed", "1"])
     assert len({name("--preference", weight, "0.7", *other) for weight in ("0.3", "0.4") for other in others}) == 10
+    assert re.match("ppo_gated-[0-9a-f]{6}-pond-v0-", name("--preference", "0.3", "0.7", policy=run))
+
+
+def test_a_policy_is_pickled_as_what_it_is_loaded_from(run, monkeypatch):
+    policy = protocol.load_policy(run)
+    monkeypatch.chdir("/")
+    again = pickle.loads(pickle.dumps(policy))
+    observations, masks = np.random.default_rng(0).random((5, 43), dtype=np.float32), np.ones((5, 25), bool)
+    np.testing.assert_array_equal(again(observations, masks, np.zeros((5, 2))), policy(observations, masks, None))
+    assert again.name == policy.name
+    with pytest.raises(ValueError, match="generator: a numpy.random.Generator is allowed, got int"):
+        policy.act(observations, masks, generator=3)
 
 
 def test_an_agent_of_one_preference_is_watched_at_its_own(tmp_path, capsys, monkeypatch):

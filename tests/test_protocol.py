@@ -138,6 +138,38 @@ def test_what_is_no_distribution_of_actions_is_refused(given, message):
         evaluate(lambda observations, masks, accrued_returns: given(masks))
 
 
+def spoiling(observations, masks, accrued_returns):
+    """A policy, as a list, that spoils what it is given."""
+    accrued_returns += 100.0
+    return (masks / masks.sum(axis=1, keepdims=True)).tolist()
+
+
+def test_a_policy_that_changes_what_it_is_given_changes_no_return():
+    task = protocol.Task.of("boreal-balanced-v0", years=1)
+    evaluation, _ = protocol.evaluate(task, spoiling, [0.5], 1, policies=("greedy",))
+    assert evaluation[["carbon_return", "thaw_return"]].abs().to_numpy().max() <= 1.0
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"policies": "greedy"}, "policies 'greedy': a list or tuple of greedy, sampled is allowed"),
+        ({"policies": ("best",)}, r"policies \('best',\): a list or tuple of greedy, sampled is allowed"),
+        ({"policies": ()}, "policies"),
+        ({"weights": 0.5}, "weights 0.5: a list of at least one is allowed"),
+        ({"weights": []}, "weights"),
+        ({"weights": [0.5, 0.5]}, "each is allowed once"),
+        ({"episodes": 1.5}, "1.5 episodes: a whole number, 1 or more, is allowed"),
+        ({"episodes": True}, "True episodes: a whole number"),
+        ({"task": "boreal-balanced-v0"}, r"task 'boreal-balanced-v0': protocol.Task.of\(env_id\) gives one"),
+    ],
+)
+def test_what_cannot_be_evaluated_is_refused(changes, message):
+    asked = {"task": protocol.Task.of("boreal-balanced-v0"), "policy": uniform, "weights": [0.5], "episodes": 1}
+    with pytest.raises(ValueError, match=message):
+        protocol.evaluate(**asked | changes)
+
+
 @pytest.mark.parametrize("uniforms", [None, np.array([0.5])])
 def test_a_diverged_policy_is_refused(uniforms):
     with pytest.raises(FloatingPointError, match="diverged"):

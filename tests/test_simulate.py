@@ -753,6 +753,45 @@ def test_bad_input_is_refused_with_the_value_and_what_is_allowed(arguments, mess
     assert "\n" not in str(refusal.value)
 
 
+MIDDLE = sim.middle_site()
+SEED = sim.episode_seeds(0)
+
+
+@pytest.mark.parametrize(
+    "call, message",
+    [
+        (lambda s: s.step([12], stands=[0.9]), r"stands: indices in \[0, 2\), each once, are allowed, got \[0.9\]"),
+        (lambda s: s.step([12, 12], stands=np.array([True, False])), "stands: indices in"),
+        (lambda s: s.step([12, 12], stands=[0, 0]), "stands: indices in"),
+        (lambda s: s.step([12], stands=[2]), "stands: indices in"),
+        (lambda s: s.step([12, 12], days=0), "days: a positive integer is allowed, got 0"),
+        (lambda s: s.step([12, 12], days=366), "days = 366: at most 365 are allowed"),
+        (
+            lambda s: s.step([12, 12], observed=np.zeros((4380, 5))),
+            r"observed: .* got shape \(4380, 5\)",
+        ),
+        (lambda s: s.step([12, 12], observed=np.full((4380, 6), np.nan)), "observed: finite numbers"),
+        (
+            lambda s: s.start(0, [{**MIDDLE, "latitude_deg": 640.0}], [SEED]),
+            "latitude_deg = 640 is outside",
+        ),
+        (lambda s: s.start(0, [{**MIDDLE, "latitude_deg": "64"}], [SEED]), "latitude_deg: a finite number is allowed"),
+        (lambda s: s.start(0, [{**MIDDLE, "latitude": 64.0}], [SEED]), "unknown site parameter 'latitude'"),
+        (lambda s: s.start(0, [{"latitude_deg": 64.0}], [SEED]), "site: mean_annual_temperature_c is missing"),
+        (lambda s: s.start(0, [MIDDLE], [0]), "seeds: sim.episode_seeds give them, got 0"),
+        (lambda s: s.start([0, 1], [MIDDLE], [SEED]), "sites: one for each of 2 stands is allowed, got 1"),
+        (lambda s: s.start(0, [MIDDLE], [SEED], {0: {"density": 3}}), "unknown initial stock 'density'"),
+        (lambda s: s.start(0, [MIDDLE], [SEED], {5: {}}), r"initial: positions in \[0, 1\) are allowed, got 5"),
+    ],
+)
+def test_stands_are_asked_for_what_there_is(call, message):
+    stands = sim.Stands(2, time_step_minutes=120)
+    stands.seeds[:] = [SEED, SEED]
+    with pytest.raises(ValueError, match=message):
+        call(stands)
+    assert not stands.years.any() and not stands.state.any()
+
+
 def test_more_stands_than_any_memory_holds_are_refused():
     with pytest.raises(ValueError, match="at most 10,000,000 are allowed at once, got 1,000,000,000,000"):
         sim.Stands(10**12)

@@ -59,7 +59,7 @@ def test_an_evaluation_takes_the_first_sites():
     assert not set(protocol.evaluation_seeds(task, 100, "validation")) & set(protocol.evaluation_seeds(task, 200))
     assert protocol.evaluation_seeds(task, 3) == TABLE.seed[:3].tolist()
     for message, arguments in {
-        "-1 episodes: 1 or more are allowed": (-1,),
+        "-1 episodes: a whole number, 1 or more, is allowed": (-1,),
         "201 episodes: the test split has 200 sites": (201,),
         "split 'train': allowed are test, validation, training, warmer_boundary, .*, calmer, less_snow": (3, "train"),
     }.items():

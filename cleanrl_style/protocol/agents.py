@@ -5,7 +5,7 @@ import importlib.util
 import json
 import pickle
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -28,6 +28,11 @@ class Policy:
     probabilities: Callable  # of observations (n, d), masks (n, 25), accrued returns (n, m): probabilities (n, 25)
     size: int  # d, entries of the observation
     looks_back: bool  # whether it needs the returns accrued so far, as EUPG does
+    source: tuple  # what it is loaded from: its file, and the script's, or None
+
+    def __reduce__(self):
+        """Pickled as what it is loaded from: a spawned process loads it again."""
+        return _load_again, (self.name, *self.source)
 
     def __call__(self, observations, masks, accrued_returns):
         """Probabilities (n, 25) for observations (n, d), masks (n, 25) and accrued returns (n, m)."""
@@ -57,6 +62,8 @@ class Policy:
             raise ValueError(f"{self.name}: accrued_returns {wanted} are allowed, got {accrued.shape}")
         if self.looks_back and not np.isfinite(accrued).all():
             raise ValueError(f"{self.name}: accrued_returns are not finite")
+        if generator is not None and not isinstance(generator, np.random.Generator):
+            raise ValueError(f"generator: a numpy.random.Generator is allowed, got {type(generator).__name__}")
         uniforms = None if generator is None else generator.random(len(masks))
         actions = choose_actions(self.probabilities(observations, masks, accrued), uniforms)
         return int(actions[0]) if np.ndim(observation) == 1 else actions
@@ -124,7 +131,13 @@ def load_policy(run_or_name, script=None) -> Policy:
     probabilities, (size,) = module.make_policy(agent), space.shape
     unknown = np.full((1, _objectives(run["arguments"])), np.nan)
     looks_back = bool(np.isnan(probabilities(np.zeros((1, size), np.float32), np.ones((1, 25), bool), unknown)).any())
-    return Policy(str(run_or_name), run["script"], run["arguments"], probabilities, size, looks_back)
+    source = str(path.absolute()), None if script is None else str(Path(script).absolute())
+    return Policy(str(run_or_name), run["script"], run["arguments"], probabilities, size, looks_back, source)
+
+
+def _load_again(name: str, file: str, script: str | None) -> Policy:
+    """A pickled policy."""
+    return replace(load_policy(file, script), name=name)
 
 
 def _check_run(saved: dict, run: dict) -> None:

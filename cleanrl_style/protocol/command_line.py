@@ -5,6 +5,7 @@ python -m boreal_env watch ppo_group --preference 0.3 --site-seed 7
 """
 
 import argparse
+import hashlib
 import sys
 import tempfile
 from pathlib import Path
@@ -13,7 +14,7 @@ import gymnasium as gym
 import numpy as np
 
 import boreal_env
-from cleanrl_style.flags import fail, policy_file, prepare_output, require, shipped_policies
+from cleanrl_style.flags import SHIPPED, fail, policy_file, prepare_output, require, shipped_policies
 from cleanrl_style.protocol.agents import Policy, load_policy
 from cleanrl_style.protocol.arguments import ask
 from cleanrl_style.protocol.compilation import compile_physics
@@ -74,7 +75,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     watch.add_argument("--sampled", action="store_true", help="draw actions instead of the most probable ones")
     watch.add_argument("--window", action="store_true", help="show it in a window, instead of writing a GIF")
     watch.add_argument(
-        "--out", type=Path, help="the GIF (<script>-<environment>-preference<w>[-site<seed>]-seed<seed>.gif)"
+        "--out", type=Path, help="the GIF (<policy>-<environment>-preference<w>[-site<seed>]-seed<seed>.gif)"
     )
     return parser.parse_args(argv)
 
@@ -212,7 +213,7 @@ def watch(args: argparse.Namespace) -> None:
     if args.window:
         show(frames)
         return
-    path = args.out or Path(name_of_animation(args, policy.script, env_id, weights))
+    path = args.out or Path(name_of_animation(args, policy, env_id, weights))
     save_animation(path, frames)
     print(f"wrote {path}: {len(frames) - 1} years")
 
@@ -230,10 +231,13 @@ def print_returns(env: gym.Env, objectives, seed: int, weights: np.ndarray, retu
     print(f"{'scalarised':>12} gain {weights @ (returns - nothing):+.2f}")
 
 
-def name_of_animation(args: argparse.Namespace, script: str, env_id: str, weights: np.ndarray) -> str:
-    """A GIF's name, another one for whatever shows other years."""
+def name_of_animation(args: argparse.Namespace, policy: Policy, env_id: str, weights: np.ndarray) -> str:
+    """A GIF's name, another one for whatever shows other years: of a run its policy's hash is in it."""
     shown = weights[:1] if len(weights) == 2 else weights
-    parts = [script, env_id.split(":")[-1], f"preference{','.join(f'{weight:g}' for weight in shown)}"]
+    file = policy_file(args.policy)
+    of_run = args.policy not in shipped_policies() or file.parent != SHIPPED
+    name = f"{policy.script}-{hashlib.sha256(file.read_bytes()).hexdigest()[:6]}" if of_run else args.policy
+    parts = [name, env_id.split(":")[-1], f"preference{','.join(f'{weight:g}' for weight in shown)}"]
     parts += [] if args.site_seed is None else [f"site{args.site_seed}"]
     return "-".join([*parts, f"seed{args.seed}", *["sampled"] * args.sampled]) + ".gif"
 

@@ -52,6 +52,7 @@ def finish(lanes: int) -> None:
 def compile_apart(lanes: int) -> None:
     """Compile in a process of its own, which leaves Ctrl-C to the main one, and the processor to who needs it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # not the training's way to stop
     LOGGER.disabled = True
     os.nice(5)
     kernel(lanes)

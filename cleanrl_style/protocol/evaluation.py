@@ -112,7 +112,7 @@ def play(task: Task, envs, policy, weights: np.ndarray, seeds: list[int], greedy
     while playing.any():
         observations = observations.astype(np.float32)
         masks = task.action_masks(envs, observations)
-        probabilities = policy(observations, masks, returns)
+        probabilities = np.asarray(policy(observations, masks, returns.copy()))
         check_probabilities(probabilities, masks.shape)
         uniforms = np.array([generator.random() for generator in generators])
         drawn = choose_actions(probabilities, uniforms)
@@ -166,7 +166,7 @@ def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, spli
     Returns the table of episodes (`evaluation_columns`; with a thaw formulation other than asymmetric also ASYMMETRIC)
     and the statistics of the annual record over the episodes of each weight (None if there is no such record).
     """
-    weights = [task.check_weights(value) for value in weights]
+    weights = check_asked(task, weights, policies)
     numbers = episodes_by_policy(task, episodes, policies)
     task, seeds = of_split(task, episodes, split)
     if task.boreal:
@@ -207,6 +207,20 @@ def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, spli
     ]
     table = pd.DataFrame(in_order, columns=(*evaluation_columns(task.objectives), *other_formulation))
     return table, pd.concat(years, ignore_index=True) if years else None
+
+
+def check_asked(task: Task, weights, policies) -> list[np.ndarray]:
+    """The weights, each (m,). Raises ValueError for what cannot be evaluated."""
+    if not isinstance(task, Task):
+        raise ValueError(f"task {task!r}: protocol.Task.of(env_id) gives one")
+    if isinstance(policies, str) or not len(policies) or not set(policies) <= set(POLICIES):
+        raise ValueError(f"policies {policies!r}: a list or tuple of {', '.join(POLICIES)} is allowed")
+    if not np.iterable(weights) or not len(weights):
+        raise ValueError(f"weights {weights!r}: a list of at least one is allowed")
+    found = [task.check_weights(value) for value in weights]
+    if len(np.unique(found, axis=0)) < len(found):
+        raise ValueError(f"weights {weights!r}: each is allowed once")
+    return found
 
 
 def asymmetric_thaw_return(record: dict) -> float:

@@ -145,10 +145,10 @@ class Run:
         occupied = self.folder.is_dir() and any(not path.name.endswith(".tmp") for path in self.folder.iterdir())
         if occupied and not config_file.exists():
             fail(f"--run-dir {self.folder}: neither empty nor a run's folder (it has no config.json)")
+        if occupied and is_foreign(config_file):
+            fail(f"--run-dir {self.folder}: not a run's folder (its config.json has no script and arguments)")
         if occupied and not self.args.overwrite:
             self._compare(config_file)
-        elif occupied and is_foreign(config_file):
-            fail(f"--run-dir {self.folder}: not a run's folder (its config.json has no script and arguments)")
         self.folder.mkdir(parents=True, exist_ok=True)
         if not occupied:
             self._write_config()

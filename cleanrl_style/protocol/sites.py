@@ -4,6 +4,8 @@ import csv
 import functools
 from importlib.resources import files
 
+import numpy as np
+
 from cleanrl_style.flags import FIRST_EVALUATION_SEED, MAX_ENVS
 from cleanrl_style.protocol.task import Task
 
@@ -40,8 +42,8 @@ def evaluation_seeds(task: Task, episodes: int, split: str = "test") -> list[int
     The first published sites where the task draws sites, else new weathers of its own site. Raises ValueError for an
     unknown split, for no episode, and for more than a split has sites.
     """
-    if episodes < 1:
-        raise ValueError(f"{episodes} episodes: 1 or more are allowed")
+    if isinstance(episodes, bool) or not isinstance(episodes, (int, np.integer)) or episodes < 1:
+        raise ValueError(f"{episodes} episodes: a whole number, 1 or more, is allowed")
     if split not in SPLITS:
         raise ValueError(f"split {split!r}: allowed are {', '.join((*SPLITS, *task.shifts))}")
     if not task.draws_sites:

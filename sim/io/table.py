@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+GZIP = b"\x1f\x8b"  # first bytes of what it packs
 NO_NUMBER = -9990.0  # -9999 and its likes stand for what is not there
 
 
@@ -49,7 +50,7 @@ def open_table(source) -> Table:
     path = Path(source)
     if not path.is_file():
         raise ValueError(f"forcing: there is no file {path}")
-    if path.suffix in (".nc", ".nc4", ".netcdf"):
+    if path.suffix.lower() in (".nc", ".nc4", ".netcdf"):
         from sim.io.dataset import import_xarray
 
         xarray = import_xarray("a NetCDF file")
@@ -66,7 +67,7 @@ def open_table(source) -> Table:
             if path.name in str(error):
                 raise
             raise ValueError(f"forcing: {path.name}: {error}") from error
-    if path.suffix in (".zip", ".xlsx", ".xls", ".grib"):
+    if path.suffix.lower() in (".zip", ".xlsx", ".xls", ".grib"):
         raise ValueError(
             f"forcing: {path.name}: a CSV file (also .gz) or a NetCDF file is allowed; unpack or export it"
         )
@@ -74,16 +75,22 @@ def open_table(source) -> Table:
     return _csv(path)
 
 
+def is_packed(path: Path) -> bool:
+    """Whether a file is packed by gzip, by its name or its first bytes."""
+    with path.open("rb") as file:
+        return path.suffix.lower() == ".gz" or file.read(2) == GZIP
+
+
 def check_utf8(what: str, path: Path) -> None:
     """Refuse a text file that is not UTF-8, by its line, or that cannot be unpacked. what : how the error begins."""
-    if path.suffix == ".gz":
+    if is_packed(path):
         try:
             with gzip.open(path, "rb") as packed:
                 while packed.read(2**20):
                     pass
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
             raise ValueError(f"{what}: it cannot be unpacked ({error}); a whole gzip file is allowed") from error
-    with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as file:
+    with gzip.open(path, "rb") if is_packed(path) else path.open("rb") as file:
         for number, line in enumerate(file, start=1):
             try:
                 line.decode("utf-8")
@@ -93,7 +100,7 @@ def check_utf8(what: str, path: Path) -> None:
 
 
 def _csv(path: Path) -> Table:
-    opened = gzip.open(path, "rt", encoding="utf-8-sig") if path.suffix == ".gz" else path.open(encoding="utf-8-sig")
+    opened = gzip.open(path, "rt", encoding="utf-8-sig") if is_packed(path) else path.open(encoding="utf-8-sig")
     with opened as file:
         comments, header = 0, file.readline()
         while header.startswith("#"):  # as AmeriFlux begins
@@ -125,6 +132,7 @@ def _csv(path: Path) -> Table:
             na_values=["NAN"],  # as Campbell's loggers write it
             dtype={name: str for name in names if _is_time(name)},
             low_memory=False,
+            compression="gzip" if is_packed(path) else None,
             encoding="utf-8-sig",
         )
         empty = table.isna().all(axis=1).to_numpy()
@@ -136,7 +144,7 @@ def _csv(path: Path) -> Table:
 def _check_fields(path: Path, separator: str, most: int, above: int) -> None:
     """Refuse a row of more fields than there are names, such as of decimal commas: it would be read shifted. above :
     lines above the names."""
-    with gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else path.open(encoding="utf-8") as file:
+    with gzip.open(path, "rt", encoding="utf-8") if is_packed(path) else path.open(encoding="utf-8") as file:
         for number, line in enumerate(file, start=1):
             fields = line.rstrip(f"{separator}\r\n").count(separator) + 1
             if number > above and fields > most and '"' not in line:

@@ -118,7 +118,11 @@ def carbon_reward(components: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def thaw_reward(cooling: np.ndarray, warming: np.ndarray, reward: Reward, formulation: str) -> np.ndarray:
-    """Thaw reward before its final clip, from heat out of and into the boundary [MJ m-2 yr-1]."""
+    """Thaw reward before its final clip, from heat out of and into the boundary [MJ m-2 yr-1].
+
+    formulation : one of `THAW_FORMULATIONS`. Raises ValueError for another.
+    """
+    check_name("thaw_formulation", formulation, THAW_FORMULATIONS)
     if formulation == "contrast":
         both = cooling + warming
         return np.where(both > 0.0, (cooling - warming) / np.where(both > 0.0, both, 1.0), 0.0)
@@ -245,8 +249,9 @@ READY_OBJECTIVES = {
 def check_objectives(objectives: Sequence) -> tuple:
     """Objectives of an environment, each once: names of the paper's, and `Objective`s, of which some have a name."""
     allowed = (*PAPER_OBJECTIVES, *READY_OBJECTIVES)
-    if isinstance(objectives, str) or not np.iterable(objectives) or not len(objectives):
-        raise ValueError(f"objectives: a sequence of {', '.join(allowed)} and Objective, got {objectives!r}")
+    # a set has no order, and the reward vector would change its own from process to process
+    if isinstance(objectives, (str, set, frozenset)) or not np.iterable(objectives) or not len(objectives):
+        raise ValueError(f"objectives: a list or tuple of {', '.join(allowed)} and Objective, got {objectives!r}")
     for objective in objectives:
         if not isinstance(objective, Objective):
             check_name("objective", objective, allowed)
