@@ -36,6 +36,7 @@ BAD_ARGUMENTS = {
         {"initial_ranges": {"density_stems_ha": (0, 0), "biomass_kgc_m2": (0, 10)}},
         r"biomass_kgc_m2: up to 10; .*\(0, 0\)",
     ),
+    "objectives without an order": ({"objectives": {"carbon", "thaw"}}, r"objectives: a list or tuple of carbon, thaw"),
     "ranges in a list": ({"initial_ranges": [1]}, r"initial.*dict.* got list"),
     "half-life 0": ({"hwp_half_life_years": 0}, r"hwp_half_life_years.* 0"),
     "half-life of text": ({"hwp_half_life_years": "long"}, r"hwp_half_life_years.*'long'"),

@@ -182,6 +182,8 @@ def test_the_warming_penalty_is_heavier_than_the_cooling_reward():
     assert asymmetric.tolist() == [0.25, -0.125, 0.0]
     assert boreal_env.thaw_reward(cool, warm, Reward(), "raw_degree_days").tolist() == [0.25, 0.25, 0.0]
     assert boreal_env.thaw_reward(cool, warm, Reward(), "contrast").tolist() == [1.0, pytest.approx(1 / 3), 0.0]
+    with pytest.raises(ValueError, match="thaw_formulation 'Contrast': allowed are asymmetric, contrast"):
+        boreal_env.thaw_reward(cool, warm, Reward(), "Contrast")
 
 
 def test_a_third_objective():

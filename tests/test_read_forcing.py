@@ -30,9 +30,11 @@ def weather():
 # ----------------------------------------------------------------------------------------------------- the formats
 
 
-@pytest.mark.parametrize("ending", [".csv", ".csv.gz"])
-def test_fluxnet_gives_the_weather_it_was_made_of(tmp_path, weather, ending):
-    records.fluxnet().to_csv(tmp_path / f"tower{ending}", index=False)
+@pytest.mark.parametrize(
+    "ending, packing", [(".csv", None), (".csv.gz", "gzip"), (".csv.GZ", "gzip"), (".csv", "gzip")]
+)
+def test_fluxnet_gives_the_weather_it_was_made_of(tmp_path, weather, ending, packing):
+    records.fluxnet().to_csv(tmp_path / f"tower{ending}", index=False, compression=packing)
     forcing = sim.read_forcing(tmp_path / f"tower{ending}", **SWEDEN)
     assert list(forcing)[:6] == NAMES and forcing.index.equals(weather.index)
     np.testing.assert_allclose(forcing[NAMES], weather, rtol=0, atol=1e-12)
@@ -813,7 +815,8 @@ def test_a_column_twice_in_memory_is_refused():
         sim.read_forcing(pd.concat([table, table[["TA_F"]]], axis=1), **SWEDEN)
 
 
-def test_another_kind_of_file_is_refused(tmp_path):
-    (tmp_path / "tower.zip").write_bytes(b"PK")
-    with pytest.raises(ValueError, match=r"tower.zip: a CSV \(also .gz\) or NetCDF file|unpack or export"):
-        sim.read_forcing(tmp_path / "tower.zip", **ALASKA)
+@pytest.mark.parametrize("name", ["tower.zip", "tower.ZIP"])
+def test_another_kind_of_file_is_refused(tmp_path, name):
+    (tmp_path / name).write_bytes(b"PK")
+    with pytest.raises(ValueError, match=rf"{name}: a CSV file \(also .gz\) or a NetCDF file .*unpack or export"):
+        sim.read_forcing(tmp_path / name, **ALASKA)
