@@ -137,6 +137,9 @@ def fill_in(args, registered: Task) -> None:
     if not any(getattr(args, "reward_scales", (1,))):
         fail("--reward-scales: not all of them 0, which leaves nothing to learn")
     if hasattr(args, "preference"):  # a script with one preference is evaluated at it
+        if number == 2 and np.size(args.preference) == 2:  # the same as the first weight alone
+            with refusing("--preference"):
+                args.preference = float(registered.check_weights(args.preference)[0])
         args.eval_weights = (args.preference,)
     if getattr(args, "eval_weights", ()) is None:
         args.eval_weights = evaluation_weights(number)
