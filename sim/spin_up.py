@@ -73,17 +73,24 @@ YEARLY_SURVIVAL = 0.975
 COHORT_YEARS = 20  # in which the stems of a first stand came up, as after a fire (Gutsell and Johnson 2002)
 
 
-def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float]:
-    """First stocks by record name, checked. Raises ValueError naming the value and what is allowed."""
+def check_stocks(values: dict | None, limits=INITIAL_LIMITS) -> dict:
+    """First stocks by record name, each for itself. Raises ValueError naming the value and what is allowed."""
     values = check_mapping("initial", values)
     for name, value in values.items():
         if name not in limits:
             raise ValueError(f"unknown initial stock {name!r}; allowed: {', '.join(limits)}")
-        if name in CLASS_NAMES and set(values) & {"density_stems_ha", "conifer_fraction", "oldest_age_years"}:
-            raise ValueError(f"initial {name}: stems by class exclude density, conifer fraction and oldest age")
         low, high = limits[name]
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not low <= value <= high:
             raise ValueError(f"initial {name} = {value!r}: a number in [{low:g}, {high:g}] is allowed")
+    return values
+
+
+def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float]:
+    """First stocks by record name, which have to go together, too. Raises ValueError as `check_stocks`."""
+    values = check_stocks(values, limits)
+    for name in values:
+        if name in CLASS_NAMES and set(values) & {"density_stems_ha", "conifer_fraction", "oldest_age_years"}:
+            raise ValueError(f"initial {name}: stems by class exclude density, conifer fraction and oldest age")
     classes = [values[name] for name in CLASS_NAMES if name in values]
     stems, biomass = sum(classes) if classes else values.get("density_stems_ha"), values.get("biomass_kgc_m2", 0.0)
     if stems == 0.0 and biomass > 0.0:

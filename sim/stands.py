@@ -40,8 +40,8 @@ from sim.spin_up import (
     SPIN_UP_STEPS_PER_DAY,
     SPIN_UP_YEARS,
     boundary_in_balance,
-    check_initial,
     check_initial_ranges,
+    check_stocks,
     climate_draws,
     deep_heat_limits,
     first_state,
@@ -404,7 +404,7 @@ class Stands:
         for position in initial or {}:
             if position not in range(number):
                 raise ValueError(f"initial: positions in [0, {number}) are allowed, got {position!r}")
-        return [check_initial((initial or {}).get(k)) for k in range(number)]
+        return [check_stocks((initial or {}).get(k)) for k in range(number)]
 
     def _draw(self, stands) -> np.ndarray:
         """The random numbers of the stands' next year, (stands, fields)."""

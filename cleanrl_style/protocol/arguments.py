@@ -31,6 +31,11 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
     check_limits(args)
     args.env_id = name_environment(args)
     registered = ask(args.env_id)  # as it is without the flags
+    if hasattr(args, "preference"):  # a script with one preference is evaluated at it
+        if registered.num_objectives == 2 and np.size(args.preference) == 2:  # the same as the first weight alone
+            with refusing("--preference"):
+                args.preference = float(registered.check_weights(args.preference)[0])
+        args.eval_weights = (args.preference,)
     fill_in(args, registered)
 
     if args.mode != registered.mode:
@@ -136,11 +141,6 @@ def fill_in(args, registered: Task) -> None:
         fail(f"--reward-scales: {number} numbers, of {names}, are allowed, not {list(args.reward_scales)}")
     if not any(getattr(args, "reward_scales", (1,))):
         fail("--reward-scales: not all of them 0, which leaves nothing to learn")
-    if hasattr(args, "preference"):  # a script with one preference is evaluated at it
-        if number == 2 and np.size(args.preference) == 2:  # the same as the first weight alone
-            with refusing("--preference"):
-                args.preference = float(registered.check_weights(args.preference)[0])
-        args.eval_weights = (args.preference,)
     if getattr(args, "eval_weights", ()) is None:
         args.eval_weights = evaluation_weights(number)
     elif number != 2 and hasattr(args, "eval_weights") and np.ndim(args.eval_weights) == 1:
