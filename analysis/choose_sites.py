@@ -20,10 +20,11 @@ from scipy.spatial.distance import cdist
 
 import sim
 from cleanrl_style import protocol
+from cleanrl_style.flags import TEST_SITES
 from cleanrl_style.protocol import sites
 from sim.physical_constants import FREEZING_POINT_K
 
-NUMBERS = {"test": 200, "validation": 100}
+NUMBERS = {"test": TEST_SITES, "validation": 100}
 
 
 @dataclass

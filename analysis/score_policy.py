@@ -12,7 +12,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from cleanrl_style.flags import fail, parse, policy_file, require
+from cleanrl_style.flags import TEST_SITES, fail, parse, policy_file, require
 
 require("tyro")
 
@@ -21,7 +21,6 @@ import tyro
 TASKS = ("boreal-generalist-v0", "boreal-balanced-v0")
 PAGE, TABLE = Path("docs", "leaderboard.md"), Path("docs", "leaderboard.csv")
 SECTION = re.compile(r"(<!-- leaderboard -->\n).*?(<!-- end of leaderboard -->)", re.DOTALL)
-SITES = 200  # of the test split
 CHECKED = 8  # episodes a weight that are played again
 SUBMITTED = ("config.json", "policy.pt", "evaluation.csv")  # what a run's folder is handed in with
 
@@ -36,7 +35,7 @@ class Args:
     """the script that trained it, if that does not lie in cleanrl_style/"""
     tasks: tuple[str, ...] = TASKS
     """environments to score it on"""
-    episodes: int = SITES
+    episodes: int = TEST_SITES
     """the first of the test sites; a row of the leaderboard has all"""
     name: str | None = None
     """name of the row (None: the script's)"""
@@ -50,12 +49,12 @@ class Args:
 
 def check_flags(args: Args) -> None:
     """End the command with one line for what is wrong without a look at the policy."""
-    if not 1 <= args.episodes <= SITES:
-        fail(f"--episodes {args.episodes}: 1 to {SITES} are allowed")
+    if not 1 <= args.episodes <= TEST_SITES:
+        fail(f"--episodes {args.episodes}: 1 to {TEST_SITES} are allowed")
     if not args.tasks:
         fail(f"--tasks: at least one is needed, such as {TASKS[0]}")
-    if args.add and (set(args.tasks) != set(TASKS) or args.episodes != SITES):
-        fail(f"--add: a row of the leaderboard is of both tasks and all {SITES} test sites")
+    if args.add and (set(args.tasks) != set(TASKS) or args.episodes != TEST_SITES):
+        fail(f"--add: a row of the leaderboard is of both tasks and all {TEST_SITES} test sites")
     page = args.root / PAGE
     if args.add and not (page.is_file() and SECTION.search(page.read_text(encoding="utf-8"))):
         fail(f"--root {args.root}: no {PAGE} with <!-- leaderboard --> to <!-- end of leaderboard -->")
