@@ -14,7 +14,7 @@ import gymnasium as gym
 import numpy as np
 
 import boreal_env
-from cleanrl_style.flags import SHIPPED, fail, policy_file, prepare_output, require, shipped_policies
+from cleanrl_style.flags import fail, policy_file, prepare_output, require, shipped_policies
 from cleanrl_style.protocol.agents import Policy, load_policy
 from cleanrl_style.protocol.arguments import ask
 from cleanrl_style.protocol.compilation import compile_physics
@@ -235,8 +235,8 @@ def name_of_animation(args: argparse.Namespace, policy: Policy, env_id: str, wei
     """A GIF's name, another one for whatever shows other years: of a run its policy's hash is in it."""
     shown = weights[:1] if len(weights) == 2 else weights
     file = policy_file(args.policy)
-    of_run = args.policy not in shipped_policies() or file.parent != SHIPPED
-    name = f"{policy.script}-{hashlib.sha256(file.read_bytes()).hexdigest()[:6]}" if of_run else args.policy
+    ships = shipped_policies().get(args.policy) == file
+    name = args.policy if ships else f"{policy.script}-{hashlib.sha256(file.read_bytes()).hexdigest()[:6]}"
     parts = [name, env_id.split(":")[-1], f"preference{','.join(f'{weight:g}' for weight in shown)}"]
     parts += [] if args.site_seed is None else [f"site{args.site_seed}"]
     return "-".join([*parts, f"seed{args.seed}", *["sampled"] * args.sampled]) + ".gif"
