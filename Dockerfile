@@ -7,8 +7,9 @@ FROM python:3.11-slim
 
 WORKDIR /borearl
 COPY . .
-# torch without CUDA: a tenth of the download
-RUN pip install --no-cache-dir --extra-index-url https://download.pytorch.org/whl/cpu -c constraints.txt -e ".[train,test]"
+# torch for processors: a tenth of the download; alone, since its index has not all versions of the rest
+RUN pip install --no-cache-dir --no-deps --index-url https://download.pytorch.org/whl/cpu -c constraints.txt torch
+RUN pip install --no-cache-dir -c constraints.txt -e ".[train,test]"
 # every kernel, so that a container does not compile them again
 ENV NUMBA_CACHE_DIR=/borearl/.cache
 RUN python -c "from cleanrl_style import protocol; from sim.block import KERNELS; protocol.compile_physics(KERNELS)"

@@ -46,7 +46,9 @@ def decode(actions) -> tuple[np.ndarray, np.ndarray]:
 
 
 def as_array(actions) -> np.ndarray:
-    """Actions as an array. Raises ValueError for rows of unequal length."""
+    """Actions as an array. Raises ValueError for rows of unequal length, and where some are masked."""
+    if np.ma.is_masked(actions):
+        raise ValueError(f"actions {reprlib.repr(actions)}: some are masked; integers in [0, {NUM_ACTIONS}) are allowed")
     try:
         return np.asarray(actions)
     except ValueError:

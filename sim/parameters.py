@@ -158,8 +158,8 @@ def scale_site(site: dict[str, float]) -> np.ndarray:
     if missing := [name for name in OBSERVED_SITE_PARAMETERS if name not in check_mapping("site", site)]:
         more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
         raise ValueError(f"site: {', '.join(missing[:3])}{more} missing; sim.sample_site and sim.middle_site give all")
-    observed = ((site[name], SITE_PARAMETERS[name]) for name in OBSERVED_SITE_PARAMETERS)
-    return np.array([(value - p.low) / (p.high - p.low) for value, p in observed])
+    parameters = {name: SITE_PARAMETERS[name] for name in OBSERVED_SITE_PARAMETERS}
+    return np.array([(_check_number(name, site[name], p) - p.low) / (p.high - p.low) for name, p in parameters.items()])
 
 
 def check_overrides(overrides: dict | None) -> dict[str, tuple[float, float]]:

@@ -2,7 +2,8 @@
 
 Each stand's parameters, state, draws and record are rows of four arrays, (stands, fields). A year copies up to
 sixteen stands into the lanes of a block, calls the compiled kernel, and copies them back; blocks run on a pool of
-threads. So any subset of stands can be stepped together, in any order, with the same bits.
+threads. So any subset of stands can be stepped together, in any order, with the same bits; and stands that are alike in
+all that a year depends on, as those of policies that have not parted yet, are simulated once.
 """
 
 import os
@@ -266,13 +267,32 @@ class Stands:
         for stand in stands:
             if self._weather[stand] is None:
                 raise RuntimeError(f"stand {stand} has not been started")
-        rows = np.empty((len(stands), days, len(DAILY))) if daily else None
-        state, record = self._run(stands, None, actions, observed, days, rows, parameters=parameters)
-        self._check(stands, parameters, state, record, "year")
+        once, alike = self._alike(stands, actions, parameters)
+        rows = np.empty((len(once), days, len(DAILY))) if daily else None
+        state, record = self._run(stands[once], None, actions[once], observed, days, rows, parameters=parameters[once])
+        self._check(stands[once], parameters[once], state, record, "year")
+        if len(once) < len(stands):
+            for stand, its_like in zip(stands, stands[once[alike]], strict=True):
+                for streams in (self._weather, self._disturbance):
+                    streams[stand].bit_generator.state = streams[its_like].bit_generator.state
+            state, record, rows = state[alike], record[alike], rows[alike] if daily else None
         self.state[stands] = state
         self.record[stands] = record
         self.years[stands] += 1
         return (record, rows) if daily else record
+
+    def _alike(self, stands, actions, parameters) -> tuple[np.ndarray, np.ndarray]:
+        """Positions of the first of stands that are alike in all that the year depends on; for each stand, its place
+        among them."""
+        each = np.arange(len(stands))
+        asked = [(action, row.tobytes()) for action, row in zip(actions.tolist(), parameters, strict=True)]
+        if len(set(asked)) == len(stands):
+            return each, each
+        first: dict[tuple, int] = {}
+        for k, stand in enumerate(stands):
+            streams = (repr(of_all[stand].bit_generator.state) for of_all in (self._weather, self._disturbance))
+            each[k] = first.setdefault((*asked[k], self.state[stand].tobytes(), *streams), k)
+        return np.unique(each, return_inverse=True)
 
     def parameters_of_year(self, stands) -> np.ndarray:
         """`parameters` of stands (stands, fields), with what a scenario makes of the year to come."""
@@ -456,9 +476,11 @@ def positive_integer(name, value) -> int:
 
 def check_observed(observed, steps: int) -> None:
     """Raise ValueError for what is no forcing of so many steps."""
-    shape, kind = np.shape(observed), np.asarray(observed).dtype.kind
-    if shape != (steps, len(FORCING)) or kind != "f" or not np.isfinite(observed).all():
-        raise ValueError(f"observed: finite numbers of shape {(steps, len(FORCING))} are allowed, got shape {shape}")
+    values = np.asarray(observed)
+    if values.shape != (steps, len(FORCING)):
+        raise ValueError(f"observed: numbers of shape {(steps, len(FORCING))} are allowed, got shape {values.shape}")
+    if values.dtype.kind != "f" or not np.isfinite(values).all():
+        raise ValueError(f"observed: finite floats are allowed, got {brief(observed)} of type {values.dtype}")
 
 
 def check_threads(threads) -> int:

@@ -263,6 +263,7 @@ def test_an_objective_cannot_rewrite_the_record():
             r"objective bad: an array of 1 finite .* array\(1.\)",
         ),
         (lambda: play(quick(objectives=(Objective("bad", lambda year: [NAN]),)), [12]), r"objective bad: .*nan"),
+        (lambda: play(quick(objectives=(Objective("bad", lambda year: ["much"]),)), [12]), r"objective bad: .*'much'"),
     ],
 )
 def test_bad_objectives_are_refused(make, message):

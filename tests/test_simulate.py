@@ -339,6 +339,11 @@ def test_shares_of_half_a_site_are_refused(site, named):
         sim.scale_site(site)
 
 
+def test_shares_of_a_site_of_text_are_refused():
+    with pytest.raises(ValueError, match="q10: a finite number is allowed, got 'two'"):
+        sim.scale_site({**sim.sample_site(5), "q10": "two"})
+
+
 def test_mean_annual_temperature_follows_latitude():
     assert mean_annual_temperature(60.5, 0.5) == pytest.approx(-7.5, abs=1e-6)
     assert mean_annual_temperature(56.0, 0.5) < -5.0  # the upper half of the normal is cut off
@@ -770,7 +775,11 @@ SEED = sim.episode_seeds(0)
             lambda s: s.step([12, 12], observed=np.zeros((4380, 5))),
             r"observed: .* got shape \(4380, 5\)",
         ),
-        (lambda s: s.step([12, 12], observed=np.full((4380, 6), np.nan)), "observed: finite numbers"),
+        (lambda s: s.step([12, 12], observed=np.full((4380, 6), np.nan)), "observed: finite floats"),
+        (
+            lambda s: s.step([12, 12], observed=np.ones((4380, 6), int)),
+            "observed: finite floats .* of type int64",
+        ),
         (
             lambda s: s.start(0, [{**MIDDLE, "latitude_deg": 640.0}], [SEED]),
             "latitude_deg = 640 is outside",

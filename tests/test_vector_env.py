@@ -206,6 +206,7 @@ def test_vector_reset_refuses(reset, message):
         ([1.5, 2.0, 3.0], r"action 1.5 of type float64: integers in \[0, 25\) are allowed"),
         (3, r"actions of shape \(\)"),
         ([[1, 2, 3]], r"actions of shape \(1, 3\)"),
+        (np.ma.masked_array([1, 2, 3], [False, True, False]), "some are masked; integers in"),
     ],
 )
 def test_vector_step_refuses(actions, message):
@@ -236,3 +237,33 @@ def test_stands_that_begin_alike_are_spun_up_once(monkeypatch):
         for reward in rewards:
             np.testing.assert_array_equal(alone.step(action)[1], reward[i])
     assert any(not np.array_equal(reward[0], reward[2]) for reward in rewards)  # their actions differ
+
+
+def test_stands_that_are_alike_are_simulated_once(monkeypatch):
+    simulated, run = [], sim.stands.run_block
+
+    def noted(lanes, parameters, *args, **kwargs):
+        simulated.append(len(parameters))
+        return run(lanes, parameters, *args, **kwargs)
+
+    monkeypatch.setattr(sim.stands, "run_block", noted)
+    seeds, years = [5, 6, 5, 5, 6], np.array([[24, 24, 24, 12, 24], [12, 12, 0, 12, 12], [3, 3, 3, 3, 3]])
+    together = gym.make_vec("boreal-balanced-v0", num_envs=5, years=3, time_step_minutes=240, threads=1)
+    together.reset(seed=seeds, options={"preference": [0.0, 0.5, 1.0, 0.2, 0.7]})
+    simulated.clear()
+    found = []
+    for k, actions in enumerate(years):
+        if k == 2:  # what is saved goes on the same
+            state = together.get_state()
+            together = gym.make_vec("boreal-balanced-v0", num_envs=5, years=3, time_step_minutes=240, threads=1)
+            together.set_state(state)
+        found.append(together.step(actions)[:2])
+    assert simulated[:3] == [3, 4, 4]  # of seeds 5, 6 and the fourth's action; then the third parts from the first
+    for i, seed in enumerate(seeds):
+        alone = gym.make("boreal-balanced-v0", years=3, time_step_minutes=240)
+        alone.reset(seed=seed, options={"preference": [0.0, 0.5, 1.0, 0.2, 0.7][i]})
+        for k, (observations, rewards) in enumerate(found[:2]):
+            observation, reward, *_ = alone.step(years[k, i])
+            np.testing.assert_array_equal(observation, observations[i])
+            np.testing.assert_array_equal(reward, rewards[i])
+        np.testing.assert_array_equal(alone.step(years[2, i])[1], found[2][1][i])

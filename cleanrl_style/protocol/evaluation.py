@@ -20,8 +20,9 @@ from sim.stands import available_cores
 POLICIES = ("greedy", "sampled")
 # The policy that results are about: one acts by it, and no exploration is left in it (docs/decisions.md, 64).
 PRIMARY = "greedy"
-# Stands stepped in one call: enough to fill eight cores' blocks of 16, and a bound on the memory.
-CHUNK = 128
+# Stands stepped in one call: enough to fill eight cores' blocks of 16 where half of them are alike, and a bound on the
+# memory.
+CHUNK = 256
 
 EVALUATION_INFO = ("growing_season_days", "latent_heat_mj_m2", "ground_shortwave_mj_m2")
 # One more column for agents trained on another thaw formulation: the thaw return of the same episodes under it.

@@ -30,11 +30,14 @@ class Table:
         return f"{self.name}, line {self.first_line + row}"
 
     def numbers(self, texts: pd.Series, name: str) -> np.ndarray:
-        """A column as numbers, NaN where nothing was measured. Raises ValueError for a text, naming its row."""
+        """A column as numbers, NaN where nothing was measured. Raises ValueError for a text or a truth value, naming
+        its row."""
         values = pd.to_numeric(texts, errors="coerce").to_numpy(float)
-        text = np.isnan(values) & texts.notna().to_numpy()
-        if text.any():
-            row = int(np.argmax(text))
+        wrong = np.isnan(values) & texts.notna().to_numpy()
+        if texts.dtype.kind in "bO":
+            wrong |= np.array([isinstance(value, (bool, np.bool_)) for value in texts])
+        if wrong.any():
+            row = int(np.argmax(wrong))
             raise ValueError(f"{self.where(row)}: {name} is {texts.iloc[row]!r}; a number is allowed")
         return np.where(values <= NO_NUMBER, np.nan, values)
 

@@ -204,10 +204,11 @@ class Objective:
         shown = {name: column.view() for name, column in year.items()}
         for column in shown.values():
             column.flags.writeable = False
-        value = np.asarray(self.value(shown), dtype=float)
+        value = np.asarray(self.value(shown))
         number = len(year["carbon_reward"])
-        if value.shape != (number,) or not np.isfinite(value).all():
+        if value.shape != (number,) or value.dtype.kind not in "biuf" or not np.isfinite(value).all():
             raise ValueError(f"objective {self.name}: an array of {number} finite numbers is allowed, got {value!r}")
+        value = value.astype(float)
         reward = np.clip(value, self.low, self.high)
         return {f"{self.name}_clipped": value - reward, f"{self.name}_reward": reward}
 
