@@ -47,12 +47,12 @@ def decode(actions) -> tuple[np.ndarray, np.ndarray]:
 
 def as_array(actions) -> np.ndarray:
     """Actions as an array. Raises ValueError for rows of unequal length, and where some are masked."""
+    what = f"integers in [0, {NUM_ACTIONS}) are allowed"
     if np.ma.is_masked(actions):
-        raise ValueError(f"actions {reprlib.repr(actions)}: some are masked; integers in [0, {NUM_ACTIONS}) are allowed")
+        raise ValueError(f"actions {reprlib.repr(actions)}: some are masked; {what}")
     try:
         return np.asarray(actions)
     except ValueError:
-        what = f"integers in [0, {NUM_ACTIONS}) are allowed"
         raise ValueError(f"actions {reprlib.repr(actions)}: rows of unequal length; {what}") from None
 
 

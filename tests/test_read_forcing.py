@@ -364,7 +364,10 @@ BAD = {
         r"SW_IN_F is [\d.]+ W m-2; \[-10, 1500\] W m-2 is allowed$",
     ),
     "text": (with_value("WS_F", "calm"), r"row 3000: WS_F is 'calm'; a number is allowed"),
-    "truth values": (lambda: tower(lambda t: t.assign(P_F=t.P_F > 0)), r"row 0.*: P_F is .*False.*; a number is allowed"),
+    "truth values": (
+        lambda: tower(lambda t: t.assign(P_F=t.P_F > 0)),
+        r"row 0.*: P_F is .*False.*; a number is allowed",
+    ),
     "no temperature": (
         lambda: tower(lambda t: t.drop(columns=["TA_F", "TA_ERA"])),
         r"no column for air temperature: none of TA_F, TA_F_MDS, .*columns={'air_temperature': '..'}; the record has T",
