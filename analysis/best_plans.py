@@ -54,6 +54,11 @@ class Args:
 # ------------------------------------------------------------------------------------------------------ the search
 
 
+def unchanging(action: str) -> str:
+    """The plan that does the same in every block, as the tables write it."""
+    return " ".join([action] * BLOCKS)
+
+
 def first_plans() -> list[tuple]:
     """The constant plans, and a forester's: plant first, then let grow; one kind of tree first, then another."""
     constant = [(action,) * BLOCKS for action in ACTIONS]
@@ -147,7 +152,7 @@ def summary(table: pd.DataFrame, weights: np.ndarray) -> pd.DataFrame:
     columns = metrics.return_columns(metrics.objectives_of(table.columns))
     gains = []
     for _, rows in table.groupby("seed"):
-        nothing = rows[rows.plan == " ".join([reference.NOTHING] * BLOCKS)][columns].to_numpy()
+        nothing = rows[rows.plan == unchanging(reference.NOTHING)][columns].to_numpy()
         parts = (rows[rows[name]][columns].to_numpy() - nothing for name in ("constant", "half", "front"))
         gains.append([(weights @ part.T).max(axis=1) for part in parts])
     constant, half, whole = np.mean(gains, axis=0)

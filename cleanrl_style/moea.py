@@ -68,10 +68,10 @@ import numpy as np
 import torch
 import torch.nn as nn
 
+from boreal_env import where_valid
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 
-NO_CHANGE = 12
 LEVELS = np.linspace(-1, 1, 5)  # genes of the five density changes, and of the five conifer shares
 # What a policy looks at: where the stand is, and of its site what decides gains.
 INPUTS = (
@@ -117,8 +117,7 @@ class Agent(nn.Module):
         genes = self.genes.numpy()[candidates].reshape(len(candidates), -1, 2)
         wanted = np.einsum("nf,nfk->nk", self.features(observations), genes)
         density, mix = np.clip(np.rint(2 + 2 * wanted), 0, 4).astype(int).T
-        actions = 5 * density + mix
-        return np.where(masks[np.arange(len(actions)), actions], actions, NO_CHANGE)
+        return where_valid(5 * density + mix, masks)
 
 
 def make_policy(agent):

@@ -30,7 +30,8 @@ NUM_ACTIONS = len(DENSITY_CHANGES) * len(CONIFER_MIXES)
 _CHANGES, _MIXES = np.array(DENSITY_CHANGES), np.array(CONIFER_MIXES)
 LEAST_DENSITY = 150.0  # stems ha-1 that thinning leaves
 LARGEST_DENSITY = 2000.0  # stems ha-1 that planting reaches
-NOTHING = 12  # an action that neither plants nor cuts
+# the action that stands for neither planting nor cutting
+NO_CHANGE = DENSITY_CHANGES.index(0.0) * len(CONIFER_MIXES) + CONIFER_MIXES.index(0.5)
 NEGLIGIBLE_STEMS = 0.01  # stems ha-1; a smaller shortfall counts as done
 
 

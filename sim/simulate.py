@@ -9,7 +9,7 @@ from sim.io.check import check_forcing, interval_of
 from sim.io.dataset import import_xarray, to_dataset
 from sim.io.disaggregation import climate_of
 from sim.jit import uncompiled
-from sim.management import NOTHING, as_array, check_actions, decode
+from sim.management import NO_CHANGE, as_array, check_actions, decode
 from sim.parameters import SITE_PARAMETERS, check_mapping, middle_site
 from sim.physical_constants import FREEZING_POINT_K
 from sim.scenario import FIRST_YEAR
@@ -122,7 +122,7 @@ def simulate(
     if time_step_minutes is None:
         time_step_minutes = max(DEFAULT_MINUTES, interval)
     years = _check_years(years, forcing, interval)
-    given = as_array(NOTHING if actions is None else actions)
+    given = as_array(NO_CHANGE if actions is None else actions)
     per_year = np.full(years, given) if given.ndim == 0 else given
     check_actions(per_year, years, "years")
     overrides, boundary = _with_boundary(check_mapping("site parameters", site), boundary)

@@ -19,7 +19,7 @@ from sim.closure import check_closure
 from sim.deadwood import deadwood_in_balance
 from sim.demography import AGES, first_ages
 from sim.draws import Seeds, draw_slice, draw_year, restored_generator
-from sim.management import NOTHING, check_actions, first_cut_age
+from sim.management import NO_CHANGE, check_actions, first_cut_age
 from sim.parameters import (
     SITE_PARAMETERS,
     brief,
@@ -227,7 +227,7 @@ class Stands:
             self.weather["weather_as_observed"], self.constants["temperature_persistence"]
         ).items():
             draws[:, draw_slice(name)] = values
-        nothing = np.full(len(stands), NOTHING)
+        nothing = np.full(len(stands), NO_CHANGE)
         steps = self.steps_per_day if observed is not None else min(self.steps_per_day, SPIN_UP_STEPS_PER_DAY)
         heat_before = gain_before = None
         for year in range(SPIN_UP_YEARS):

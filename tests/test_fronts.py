@@ -64,7 +64,7 @@ def test_equal_plans_have_equal_genes():
 
     nsga2.search(objectives, 2, genes.Budget(8, 5, 1, 1), seed=1)
     assert all(len(set(generation)) == len(generation) for generation in seen)
-    assert all(gene[k + 1] == genes.HALF for gene in sum(seen, []) for k in (0, 2) if gene[k] == genes.NO_CHANGE)
+    assert all(gene[k + 1] == genes.HALF for gene in sum(seen, []) for k in (0, 2) if gene[k] == genes.UNCHANGED)
 
 
 def test_front_gains_and_ends_of_a_hand_case():

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 LEVELS = 5
-NO_CHANGE = 2  # density index
+UNCHANGED = 2  # density index
 HALF = 2  # mix index
 
 
@@ -30,8 +30,8 @@ def plans(genes: np.ndarray, block_years: int, years: int) -> np.ndarray:
 
 def constant_genes(blocks: int) -> np.ndarray:
     """The constant plans: no change, and every density change with every mix, (21, 2 x blocks)."""
-    pairs = [(density, mix) for density in range(LEVELS) for mix in range(LEVELS) if density != NO_CHANGE]
-    return np.tile([(NO_CHANGE, HALF), *pairs], blocks)
+    pairs = [(density, mix) for density in range(LEVELS) for mix in range(LEVELS) if density != UNCHANGED]
+    return np.tile([(UNCHANGED, HALF), *pairs], blocks)
 
 
 def first_genes(blocks: int, number: int, generator: np.random.Generator) -> np.ndarray:
@@ -43,7 +43,7 @@ def first_genes(blocks: int, number: int, generator: np.random.Generator) -> np.
     forester = []
     for share in (0.2, 0.4):
         planting = max(1, round(share * blocks))
-        forester += [[(4, mix)] * planting + [(NO_CHANGE, HALF)] * (blocks - planting) for mix in range(LEVELS)]
+        forester += [[(4, mix)] * planting + [(UNCHANGED, HALF)] * (blocks - planting) for mix in range(LEVELS)]
     half = blocks // 2
     forester += [[(4, a)] * half + [(4, b)] * (blocks - half) for a, b in ((4, 0), (0, 4))]
     genes = np.concatenate([constant_genes(blocks), np.reshape(forester, (len(forester), -1))])

@@ -15,7 +15,7 @@ from pymoo.core.repair import Repair
 from pymoo.operators.crossover.pntx import TwoPointCrossover
 from pymoo.optimize import minimize
 
-from analysis.studies.genes import HALF, LEVELS, NO_CHANGE, Budget, first_genes
+from analysis.studies.genes import HALF, LEVELS, UNCHANGED, Budget, first_genes
 
 
 def search(objectives: Callable, blocks: int, budget: Budget, seed: int) -> np.ndarray:
@@ -57,5 +57,5 @@ class _OneGeneForNoChange(Repair):
 
     def _do(self, problem, X, **kwargs):
         pairs = X.reshape(len(X), -1, 2).copy()
-        pairs[:, :, 1] = np.where(pairs[:, :, 0] == NO_CHANGE, HALF, pairs[:, :, 1])
+        pairs[:, :, 1] = np.where(pairs[:, :, 0] == UNCHANGED, HALF, pairs[:, :, 1])
         return pairs.reshape(X.shape)

@@ -9,16 +9,18 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics, stored
+from analysis.best_plans import unchanging
 from analysis.generalisation import RATIOS, judged
 from analysis.results import PAIR
-from analysis.studies.constant_plans import ENVIRONMENTS
+from analysis.studies.constant_plans import DECIDUOUS, ENVIRONMENTS
 from analysis.tables.common import ROW_COLUMNS, over_seeds, row_of
+from cleanrl_style.protocol import reference
 from cleanrl_style.protocol.fronts import evaluation_weights
 from cleanrl_style.protocol.score import by_weight
 
 MADE_BY = "python analysis/best_plans.py"
 WEIGHTS = evaluation_weights(2)
-NOTHING, DECIDUOUS = "12 12 12 12 12", "20 20 20 20 20"
+NOTHING, DENSE_DECIDUOUS = unchanging(reference.NOTHING), unchanging(str(DECIDUOUS))
 #: Rows of plans that look at nothing: name -> title.
 BLIND = {
     "dense_deciduous": "100 deciduous trees a year",
@@ -96,7 +98,7 @@ def of_blind_plans(constant: pd.DataFrame) -> dict[str, pd.Series]:
     returns = constant[metrics.return_columns(PAIR)].to_numpy()
     gained = pd.DataFrame({weight: returns @ metrics.pair(weight) for weight in WEIGHTS})
     of_plans = gained.groupby(constant.plan.to_numpy()).mean()
-    means = (of_plans.loc[DECIDUOUS], of_plans.max(), best_at(constant, WEIGHTS).mean())
+    means = (of_plans.loc[DENSE_DECIDUOUS], of_plans.max(), best_at(constant, WEIGHTS).mean())
     return dict(zip(BLIND, means, strict=True))
 
 

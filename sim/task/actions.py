@@ -9,13 +9,12 @@ import numpy as np
 
 from sim.demography import AGE_CLASSES
 from sim.jit import uncompiled
-from sim.management import CONIFER_MIXES, DENSITY_CHANGES, NEGLIGIBLE_STEMS, feasible_change
+from sim.management import CONIFER_MIXES, DENSITY_CHANGES, NEGLIGIBLE_STEMS, NO_CHANGE, feasible_change
 from sim.parameters import check_name
 from sim.task.observation import AGE_ENTRIES, SPECIES_AND_AGES, Reader, observation_rows
 
 MAY_BE_CUT = AGE_CLASSES[AGE_CLASSES.index("young") :]
 FIRST_UNCHANGED = DENSITY_CHANGES.index(0.0) * len(CONIFER_MIXES)
-NO_CHANGE = FIRST_UNCHANGED + CONIFER_MIXES.index(0.5)  # an action that neither plants nor thins
 
 #: Entries of the observation that a mask is made of.
 NEEDED = ("density", *AGE_ENTRIES)
