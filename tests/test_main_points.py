@@ -47,6 +47,7 @@ def results(monkeypatch):
     monkeypatch.setattr(main_points, "is_below", lambda one, other: SCORES[one[0]] < SCORES[other[0]] - 5)
     monkeypatch.setattr(main_points, "points", lambda one, other, best: f"{SCORES[one[0]] - SCORES[other[0]]:.1f}")
     monkeypatch.setattr(main_points, "front_of_plans", lambda results, env_id: 3.0)
+    monkeypatch.setattr(main_points, "flattery", lambda results, env_id: 0.5)
     return SimpleNamespace(rows_of_two_objectives=lambda: rows)
 
 
@@ -73,7 +74,9 @@ def test_the_score_of_a_single_training_is_not_shown(results):
 def test_the_words_follow_from_the_numbers(results):
     assert " ".join(main_points.in_words(results).split()) == (
         "- **`boreal-balanced-v0`** - Plans that look at nothing: 100 stems a year, half of them conifers, score 70, "
-        "100 deciduous trees a year 95 [90, 100]. All constant plans together have a gain hypervolume of 3.00. - Of 5"
+        "100 deciduous trees a year 95 [90, 100]. All constant plans together have a gain hypervolume of 3.00. The "
+        "best of each weight, which 100 stands for, gain 0.5 % less when they are chosen on a half of the sites and judged "
+        "on the other. - Of 5"
         " trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds. Its score less that of 100 "
         "deciduous trees a year is 15.0. By the interval of the difference on the same sites none is above 100; Group"
         " PPO is above planting half and half; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run "
@@ -125,3 +128,17 @@ def test_intervals_are_left_out_where_there_are_none():
     assert main_points.shown({"score_greedy": 99.6}) == "100"
     assert main_points.shown({"score_greedy": float("nan")}) == ""
     assert main_points.named([], "store") == "none stores"
+
+
+def test_plans_that_were_chosen_on_their_sites_are_flattered():
+    """Two plans that are the better one on half of the sites each: which is chosen says nothing of the other sites."""
+    sites = np.arange(40)
+    lucky = np.where(sites % 2, 1.0, 3.0)
+    plans = pd.concat(
+        pd.DataFrame({"action": action, "seed": sites, "carbon_return": returns, "thaw_return": returns})
+        for action, returns in ((12, 0.0 * sites), (20, lucky), (24, lucky[::-1]))
+    )
+    results = SimpleNamespace(constant_plans_in=lambda *conditions: plans)
+    assert 2.0 < main_points.flattery(results, WORLD) < 20.0
+    plans.loc[plans.action == 20, ["carbon_return", "thaw_return"]] = 5.0  # better on every site
+    assert main_points.flattery(results, WORLD) == pytest.approx(0.0, abs=1e-9)
