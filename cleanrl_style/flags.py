@@ -29,7 +29,9 @@ PARSING = re.compile(
     r"Error parsing (?P<flag>--\S+): (?P<why>invalid literal for int.*?|could not convert string to float|"
     r"no type matching .*?(INT|FLOAT).*? could be instantiated from):? (?P<values>\[?'.*'\]?)\.?"
 )
-#: Closed interval of each argument that has one.
+#: What it says of them where there may be any number.
+SEVERAL = re.compile(r"Error parsing (--\S+): Could not find valid parse for arguments: \[(.*)\]\.?")
+#: Closed interval of each argument that has one; an algorithm's own are the `limits` of its arguments.
 LIMITS = {
     "seed": (0, FIRST_EVALUATION_SEED // MAX_ENVS - 1),
     "site_seed": (0, 2**63 - 1),
@@ -52,9 +54,6 @@ LIMITS = {
     "reward_scales": (0, 10**6),
     "threshold": (0, 1),
     "preference": (0, 1),
-    "population": (4, MAX_ENVS),
-    "episodes_each": (1, MAX_ENVS),
-    "block_years": (1, 10**6),
     "sites": (1, 10**6),
     "first_site": (0, 10**9),
     "stands": (1, 10**9),
@@ -67,26 +66,6 @@ LIMITS = {
     "repeats": (1, 10**4),
     "dollars_per_core_hour": (0, 10**6),
     "dollars_per_gpu_hour": (0, 10**6),
-    # of other libraries' algorithms
-    "batch_size": (2, 10**6),
-    "buffer_episodes": (1, 10**6),
-    "epsilon_decay_steps": (1, 10**9),
-    "exchange_every": (1, 10**9),
-    "gradient_updates": (1, 10**6),
-    "hidden_dim": (1, 10**5),
-    "homotopy_decay_steps": (1, 10**9),
-    "learning_starts": (1, 10**9),
-    "n_epochs": (1, 10**6),
-    "n_steps": (2, 10**9),
-    "num_er_episodes": (1, 10**6),
-    "num_model_updates": (1, 10**6),
-    "num_step_episodes": (1, 10**6),
-    "own_episodes": (1, 10**6),
-    "pop_size": (2, 1000),
-    "return_scale": (1e-6, 10**6),
-    "target_entropy_scale": (0, 1),
-    "target_net_update_freq": (1, 10**9),
-    "timesteps_per_iter": (1, 10**9),
 }
 
 
@@ -184,13 +163,20 @@ def message_of(box: str) -> str:
 
 def in_plain_words(message: str) -> str:
     """What tyro says of a value that is not of its flag's type, without the names of types."""
+    if several := SEVERAL.fullmatch(message):
+        return f"{several[1]} {words_of(several[2])}: not of the kind that --help shows"
     found = PARSING.fullmatch(message)
     if not found:
         return message
-    flag, why, values = found["flag"], found["why"], " ".join(re.findall("'([^']*)'", found["values"]))
+    flag, why, values = found["flag"], found["why"], words_of(found["values"])
     what = "whole number" if "int" in why.lower() else "number"
     allowed = f"{what}s are" if "..." in why else f"a {what} is"
     return f"{flag} {values}: {allowed} allowed"
+
+
+def words_of(values: str) -> str:
+    """A printed list of texts as it was typed."""
+    return " ".join(re.findall("'([^']*)'", values))
 
 
 def check_lists(args) -> None:
@@ -203,7 +189,7 @@ def check_lists(args) -> None:
 
 def check_limits(args) -> None:
     """End the script with one line for an argument outside its limits, or one that does not go with --num-envs."""
-    for name, (low, high) in LIMITS.items():
+    for name, (low, high) in (LIMITS | getattr(args, "limits", {})).items():
         value = getattr(args, name, None)
         for number in flat(value):
             if not low <= number <= high:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from cleanrl_style.flags import parse, require
+from cleanrl_style.flags import MAX_ENVS, parse, require
 
 
 @dataclass
@@ -58,6 +58,7 @@ class Args:
 
     num_envs = 1  # no flag: population x episodes_each
     trial = 12000, "ten minutes"  # a generation; what `--help` says
+    limits = {"block_years": (1, 10**6), "population": (4, MAX_ENVS), "episodes_each": (1, MAX_ENVS)}
 
 
 if __name__ == "__main__":

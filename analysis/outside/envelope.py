@@ -6,6 +6,7 @@ Settings are those of the library's example of discrete actions (minecart), but 
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from analysis.outside.arguments import Args
 from cleanrl_style.flags import parse, require
@@ -31,6 +32,14 @@ class EnvelopeArgs(Args):
     """steps between copies of the network to its target"""
     homotopy_decay_steps: int = 10_000
     """steps in which the loss goes from the vector's to the scalarised"""
+
+    limits: ClassVar = {
+        "batch_size": (2, 10**6),
+        "epsilon_decay_steps": (1, 10**9),
+        "gradient_updates": (1, 10**6),
+        "homotopy_decay_steps": (1, 10**9),
+        "target_net_update_freq": (1, 10**9),
+    }
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ its own evaluation, which count in no budget; cost.csv says how many steps they 
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from analysis.outside.arguments import Args
 from cleanrl_style.flags import parse, require
@@ -34,6 +35,15 @@ class GPILSArgs(Args):
     """steps for each chosen weight"""
     own_episodes: int = 5
     """episodes of each of its own evaluations"""
+
+    limits: ClassVar = {
+        "batch_size": (2, 10**6),
+        "epsilon_decay_steps": (1, 10**9),
+        "gradient_updates": (1, 10**6),
+        "own_episodes": (1, 10**6),
+        "target_net_update_freq": (1, 10**9),
+        "timesteps_per_iter": (1, 10**9),
+    }
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ Settings are the library's own, but for the stands: 16 in lockstep, which the li
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from analysis.outside.arguments import Args
 from cleanrl_style.flags import parse, require
@@ -33,6 +34,8 @@ class MaskablePPOArgs(Args):
     """lambda of generalised advantage estimation"""
     ent_coef: float = 0.0
     """weight of the entropy bonus"""
+
+    limits: ClassVar = {"batch_size": (2, 10**6), "n_epochs": (1, 10**6), "n_steps": (2, 10**9)}
 
 
 if __name__ == "__main__":

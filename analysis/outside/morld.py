@@ -7,6 +7,7 @@ its archive by its own evaluation, which counts in no budget; cost.csv says how 
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from analysis.outside.arguments import Args
 from cleanrl_style.flags import parse, require
@@ -32,6 +33,15 @@ class MORLDArgs(Args):
     """aim of the policies' entropy, in that of 25 equal actions"""
     own_episodes: int = 5
     """episodes of each of its own evaluations"""
+
+    limits: ClassVar = {
+        "batch_size": (2, 10**6),
+        "exchange_every": (1, 10**9),
+        "learning_starts": (1, 10**9),
+        "own_episodes": (1, 10**6),
+        "pop_size": (2, 1000),
+        "target_entropy_scale": (0, 1),
+    }
 
 
 if __name__ == "__main__":

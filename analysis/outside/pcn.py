@@ -6,6 +6,7 @@ At a weight it is told the return of the best episode for that weight that it re
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from analysis.outside.arguments import Args
 from cleanrl_style.flags import parse, require
@@ -33,6 +34,16 @@ class PCNArgs(Args):
     """episodes between updates"""
     num_model_updates: int = 50
     """updates between episodes"""
+
+    limits: ClassVar = {
+        "batch_size": (2, 10**6),
+        "buffer_episodes": (1, 10**6),
+        "hidden_dim": (1, 10**5),
+        "num_er_episodes": (1, 10**6),
+        "num_model_updates": (1, 10**6),
+        "num_step_episodes": (1, 10**6),
+        "return_scale": (1e-6, 10**6),
+    }
 
 
 if __name__ == "__main__":
