@@ -336,6 +336,18 @@ BAD = {
         lambda: tower(lambda t: t.assign(SW_IN_F=t.SW_IN_F * 1.6)),
         r"SW_IN_F.*: a clear day has 1\d\d %",
     ),
+    "light for photosynthesis": (
+        lambda: tower(lambda t: t.assign(SW_IN_F=t.SW_IN_F * 0.45), days=365),
+        r"SW_IN_F.*: a clear day has 3\d.*at latitude 64.256 on its date, where 60 to 85 are usual",
+    ),
+    "winter for summer": (
+        lambda: tower(lambda t: t.assign(TA=-t.TA), days=365, made=records.icos),
+        r"2019: TA is highest around day 1\d of the year; days 160 to 235 are usual; unusual='take'",
+    ),
+    "the air of other months": (
+        lambda: tower(lambda t: t.assign(TA=np.roll(t.TA, 48 * 60)), days=365, made=records.icos),
+        r"2019: TA is highest around day 2[56]\d of the year",
+    ),
     "net longwave": (lambda: tower(LW_IN_F=-60.0), r"row 0 .*LW_IN_F is -60 W m-2; \[50, 600\]"),
     "a negative wind": (with_value("WS_F", -1.0), r"row 3000 .*WS_F is -1 m s-1; \[0, 60\]"),
     "negative rain": (with_value("P_F", -2.0), r"row 3000 .*P_F is -2 mm; \[-0.1, 200\]"),
