@@ -18,6 +18,7 @@ from cleanrl_style.protocol.reference import physics_name
 
 SITE_SPECIFIC = "site-specific"  # the mode in which all episodes are of one site and weather
 ARCHIVED = "tables.zip"  # the reduced tables of an archived run
+NAMES_IN_TABLES = ("policy", "variable", "phase")  # columns of a run's tables that are no numbers
 
 # Arguments that do not make another row: what tells its runs apart, what the row has a column for, and the output.
 NOT_A_SETTING = ("seed", "site_seed", "preference", "mode", "env_id", "run_dir", "overwrite")
@@ -123,11 +124,22 @@ def read_whole(folder: Path, trained: bool) -> dict[str, pd.DataFrame]:
 
 
 def read_table(path: Path) -> pd.DataFrame:
-    """A table of a run; ValueError names the file that cannot be read."""
+    """A table of a run; ValueError names the file that cannot be read, and the first line that has text for a number."""
     try:
-        return pd.read_csv(path)
+        table = pd.read_csv(path)
     except (ValueError, OSError) as error:
-        raise ValueError(f"damaged: {path.name} ({' '.join(str(error).split())})") from error
+        raise ValueError(f"damaged: {path.name} ({in_a_line(error)})") from error
+    for name in table.columns.difference(NAMES_IN_TABLES, sort=False):
+        wrong = table[name].notna() & pd.to_numeric(table[name], errors="coerce").isna()
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise ValueError(f"damaged: {path.name}, line {row + 2}: {name} is {table[name].iloc[row]!r}, not a number")
+    return table
+
+
+def in_a_line(error: Exception) -> str:
+    """What an error says, without its line breaks."""
+    return " ".join(str(error).split())
 
 
 def read_config(folder: Path) -> dict:
@@ -159,7 +171,7 @@ def read_run(folder: Path) -> Run:
     try:
         return Run(folder, config, reduction.reduce(tables, steps, primary_of(config)))
     except (AttributeError, KeyError, TypeError) as error:
-        raise ValueError(f"damaged: a table lacks a column ({error})") from error
+        raise ValueError(f"damaged: a table lacks a column ({in_a_line(error)})") from error
 
 
 def check(evaluation: pd.DataFrame, config: dict) -> None:

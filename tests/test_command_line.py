@@ -160,9 +160,10 @@ def test_a_bad_command_gets_one_line(run, given, message, monkeypatch):
         ("evaluation.csv", lambda data: b""),
         ("evaluation.csv", lambda data: data[:-3]),
         ("evaluation.csv", lambda data: data[: data[:-1].rindex(b"\n") + 1]),
+        ("episodes.csv", lambda data: data[:100]),
         ("policy.pt", lambda data: data[: len(data) // 2]),
     ],
-    ids=["empty", "cut in a number", "cut after a row", "half a policy"],
+    ids=["empty", "cut in a number", "cut after a row", "half a log", "half a policy"],
 )
 def test_a_finished_run_that_is_damaged_is_not_called_finished(run, tmp_path, name, harm):
     folder = tmp_path / "run"

@@ -266,7 +266,7 @@ def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):
 def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
     runs = tmp_path / "runs"
     names = ("good", "unfinished", "config", "truncated", "columns", "infinite", "partial", "broken-years", "twin")
-    for name in (*names, "without-any-steps"):
+    for name in (*names, "without-any-steps", "text-for-numbers"):
         write_run(runs / name, "ppo_curriculum", seed=1 if name == "twin" else len(name) + 20)
     write_run(runs / "zz-first", "ppo_curriculum", seed=1)
     (runs / "unfinished" / "evaluation.csv").unlink()
@@ -281,11 +281,13 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
     (runs / "partial" / "episodes.csv").unlink()
     file = runs / "without-any-steps" / "episodes.csv"
     pd.read_csv(file).drop(columns="global_step").to_csv(file, index=False)
+    file = runs / "text-for-numbers" / "episodes.csv"
+    file.write_text(re.sub(r"^\d+,", "x,", file.read_text(), count=2, flags=re.M))
     (runs / "broken-years" / "evaluation_years.csv").write_bytes(b"")
     table = make(runs, tmp_path / "tables")
     assert table.loc[("ppo_curriculum", "boreal-generalist-v0", "default")].seeds == 2
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 9
+    assert len(lines) == 10
     for name, reason in [
         ("unfinished", "no evaluation.csv"),
         ("config", "config.json"),
@@ -294,6 +296,7 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
         ("infinite", "not finite"),
         ("partial", "partial: it has no episodes.csv"),
         ("without-any-steps", "damaged: a table lacks a column"),
+        ("text-for-numbers", "damaged: episodes.csv, line 2: global_step is 'x', not a number"),
         ("broken-years", "damaged: evaluation_years.csv"),
         ("zz-first", "the same run as"),
     ]:

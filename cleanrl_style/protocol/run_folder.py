@@ -457,11 +457,14 @@ def is_foreign(config_file: Path) -> bool:
 def damage_of(folder: Path, weights: int) -> str | None:
     """Which file of a finished run, all written whole, something has cut short or changed since; None if none."""
     evaluation, policy = folder / "evaluation.csv", folder / "policy.pt"
+    for table in sorted(folder.glob("*.csv")):
+        if not table.read_bytes().endswith(b"\n"):
+            return table.name
     try:
         table = pd.read_csv(evaluation)
         by_weight = table.groupby(["policy", *weight_columns(objectives_of(table.columns))]).size()
         alike = by_weight.groupby("policy").agg(lambda episodes: len(episodes) == weights and episodes.nunique() == 1)
-        whole = evaluation.read_bytes().endswith(b"\n") and len(alike) and alike.all()
+        whole = len(alike) and alike.all()
     except (ValueError, KeyError):
         whole = False
     if not whole:
