@@ -5,6 +5,9 @@
 #     docker run --rm borearl pytest                                   # all tests but the slow ones
 FROM python:3.11-slim
 
+# some tests compare commits
+RUN apt-get update && apt-get install -y --no-install-recommends git && rm -rf /var/lib/apt/lists/*
+
 WORKDIR /borearl
 COPY . .
 # torch for processors: a tenth of the download; alone, since its index has not all versions of the rest

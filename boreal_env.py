@@ -210,7 +210,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `time_step_minutes`: a divisor of 1440, at most 120 (30)
     - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (on a GPU, for thousands of stands)
     - `thaw_formulation`: "asymmetric", "contrast" or "raw_degree_days"
-    - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one; of m objectives, not two, all m weights
+    - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one, or the weights of all objectives
     - `site_seed`: one site (`sim.sample_site(site_seed)`) instead of a new one each episode
     - `parameter_overrides`: site parameter -> value or (low, high), see `sim/site_parameters.csv`; nothing else of the
       site changes, but with `latitude_deg` the mean annual temperature, which is drawn around its latitude's

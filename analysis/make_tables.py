@@ -57,6 +57,7 @@ TABLES = (
     group_choices,
 )
 
+SHOWN = 3  # commands of what is not there
 EXPLANATION = """Score: 0 is to do nothing, 100 the best constant plan of each weight. Interquartile mean over training
 seeds [95 % bootstrap interval, of score and gain over seeds and sites]. Seeds to tell 0.1: a method, of gain."""
 
@@ -79,14 +80,16 @@ def name_of(table) -> str:
 
 
 def say_what_is_missing(results: Results) -> None:
-    """Print the commands of the runs and studies that are not there, the first of each row."""
+    """Print how many rows and studies of the project's experiments are not there, and the first commands of them."""
     rows = {job.row: job for job in reversed(results.missing)}
     commands = [job.command for job in reversed(rows.values()) if job.exists]
     studies = [job for job in results.jobs if job.is_study and results.study(job.script) is None]
     commands += [job.command for job in studies]
     if commands:
-        print("\nNot there yet, in whole or in part (`python analysis/reproduce.py` makes all); the first of each row:")
-        print("\n".join(f"  {line}" for line in commands))
+        print(f"\nOf the project's experiments {len(commands)} rows and studies are not there, or not whole:")
+        print("\n".join(f"  {line}" for line in commands[:SHOWN]))
+        more = f"  and {len(commands) - SHOWN} more; " if len(commands) > SHOWN else "  "
+        print(f"{more}`python analysis/reproduce.py --list` names all, without --list makes them")
     without_script = dict.fromkeys(job.script for job in results.missing if not job.exists)
     if without_script:
         print(f"No script yet for {', '.join(without_script)}.")

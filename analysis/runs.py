@@ -124,7 +124,7 @@ def read_whole(folder: Path, trained: bool) -> dict[str, pd.DataFrame]:
 
 
 def read_table(path: Path) -> pd.DataFrame:
-    """A table of a run; ValueError names the file that cannot be read, and the first line that has text for a number."""
+    """A table of a run; ValueError names the file that cannot be read, or its first line of text for a number."""
     try:
         table = pd.read_csv(path)
     except (ValueError, OSError) as error:

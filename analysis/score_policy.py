@@ -62,6 +62,8 @@ def check_flags(args: Args) -> None:
         fail("--replace goes with --add")
     if args.name is not None and (not args.name.strip() or {"|", "\n"} & set(args.name)):
         fail(f"--name {args.name!r}: a cell of a table, without |, is allowed")
+    if args.name is not None and not args.add:
+        fail("--name goes with --add")
     if args.script is not None and not (args.script.is_file() and args.script.suffix == ".py"):
         fail(f"--script {args.script}: a file that ends in .py, and is there, is allowed")
     try:

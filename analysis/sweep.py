@@ -83,6 +83,8 @@ def numbers(text: str) -> list[int]:
         if match is None:
             protocol.fail(f"--seeds {text}: numbers and ranges are allowed, such as 1-10 or 1,3,7-9")
         low, high = int(match[1]), int(match[2] or match[1])
+        if low > high:
+            protocol.fail(f"--seeds {text}: {part} is allowed as {high}-{low}")
         if high > LIMITS["seed"][1]:
             protocol.fail(f"--seeds {text}: at most {LIMITS['seed'][1]} is allowed")
         found += range(low, high + 1)

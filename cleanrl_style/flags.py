@@ -100,7 +100,7 @@ def policy_file(run_or_name) -> Path:
         path = ships.get(str(run_or_name), path)
     if not path.is_file():
         raise FileNotFoundError(
-            f"{run_or_name}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a policy that "
+            f"{run_or_name or repr(str(run_or_name))}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a policy that "
             f"ships ({', '.join(ships) or 'none does yet'})"
         )
     return path
@@ -245,7 +245,7 @@ def no_environment(error: Exception) -> str:
     import gymnasium as gym
 
     ours = ", ".join(name for name in gym.registry if name.startswith("boreal-"))
-    return f"{str(error).splitlines()[0]}; allowed: {ours}, or module:id of an environment of yours"
+    return f"{str(error).splitlines()[0].rstrip('.')}; allowed: {ours}, or module:id of an environment of yours"
 
 
 def fill_in_envs(args) -> None:

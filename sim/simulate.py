@@ -10,10 +10,10 @@ from sim.io.dataset import import_xarray, to_dataset
 from sim.io.disaggregation import climate_of
 from sim.jit import uncompiled
 from sim.management import NO_CHANGE, as_array, check_actions, decode
-from sim.parameters import SITE_PARAMETERS, check_mapping, middle_site
+from sim.parameters import SITE_PARAMETERS, brief, check_mapping, middle_site
 from sim.physical_constants import FREEZING_POINT_K
 from sim.scenario import FIRST_YEAR
-from sim.spin_up import BOUNDARY, INITIAL_RANGES, check_initial, crown_covers, first_state, first_stems
+from sim.spin_up import BOUNDARIES, BOUNDARY, INITIAL_RANGES, check_initial, crown_covers, first_state, first_stems
 from sim.stands import HELD_COLUMNS, Stands
 from sim.state import DAILY, DAILY_NAMES, DAYS, PARAMETER_NAMES, RECORD, RECORD_NAMES
 from sim.structure import leaf_out
@@ -70,7 +70,8 @@ def simulate(
     site : dict of site parameters that differ from the middle of their ranges (any value inside the physical
         limits of `sim/site_parameters.csv`), or None. All of them, as `sim.sample_site` returns them, are a site too.
         Latitude and climate are the forcing's, where they are not given; a frame that neither `sim.read_forcing` nor
-        `sim.half_hours` made does not know its latitude.
+        `sim.half_hours` made does not know its latitude. Beside whole years of forcing nothing acts of what the
+        weather generator takes of the site, such as rain and wind, nor does `weather`.
     actions : integer in [0, 25) for every year, or a sequence with one a year; None changes nothing.
     seed : of first state, weather and disturbances.
     years : years to run, at most 10,000; by default those of the forcing, or 50.
@@ -224,6 +225,9 @@ def _check_part(days: int, output: str, overrides: dict) -> None:
 def _with_boundary(site: dict, boundary) -> tuple[dict, object]:
     """The site with a boundary's temperature that is given as a number [degC], and how the boundary is found."""
     if isinstance(boundary, (bool, np.bool_)) or not isinstance(boundary, NUMBER):
+        if not isinstance(boundary, str) or boundary not in BOUNDARIES:
+            allowed = ", ".join(BOUNDARIES)
+            raise ValueError(f"boundary {brief(boundary)}: allowed are {allowed}, and a temperature in degC")
         return site, boundary
     parameter = SITE_PARAMETERS[BOUNDARY]
     low, high = (limit - FREEZING_POINT_K for limit in (parameter.physical_low, parameter.physical_high))

@@ -241,6 +241,7 @@ def test_a_damaged_file_of_a_submitted_run_is_named(run, tmp_path, name, text, m
         (("ppo_group", "--episodes", "0"), "--episodes 0: 1 to 200 are allowed"),
         (("ppo_group", "--root", "/nowhere", "--add"), "--root /nowhere: no docs/leaderboard.md with"),
         (("ppo_group", "--name", "a|b"), r"--name 'a\|b': a cell of a table, without \|, is allowed"),
+        (("ppo_group", "--name", "mine"), "--name goes with --add"),
         (("ppo_group", "--script", "nowhere.py"), "--script nowhere.py: a file that ends in .py, and is there"),
         (("ppo_group", "--tasks", "boral-v0"), "--tasks boral-v0: Environment `boral` doesn't exist"),
     ],

@@ -269,3 +269,10 @@ def test_an_objective_cannot_rewrite_the_record():
 def test_bad_objectives_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_an_objective_of_a_column_that_is_not_there_is_named():
+    with pytest.raises(KeyError, match="harvest") as refused:
+        play(quick(objectives=(Objective("mine", lambda year: year["harvest"]),)), [12])
+    assert refused.value.__notes__[0].startswith("objective mine: columns of the record are ")
+    assert "harvest_kgc_m2" in refused.value.__notes__[0]

@@ -733,7 +733,7 @@ BAD_FILES = {
     "nothing but names": ("TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n", r"tower.csv: 0 rows; whole days"),
     "decimal commas": (
         "TIMESTAMP;TA_F;VPD_F;WS_F;SW_IN_F;P_F\n20190101;1,5;1;1;1;0\n20190102;1,5;1;1;1;0\n",
-        r"line 2: TA_F is '1,5'; a number is allowed",
+        r"line 2: TA_F is '1,5'; a number with a decimal point is allowed",
     ),
     "names of no one": ("date,t,q\n20190101,1,1\n", r"tower.csv: no column for air temperature: none of TA_F"),
     "decimal commas between commas": (

@@ -714,7 +714,7 @@ BAD = {
         {"lai": 9.0, "initial": {"density_stems_ha": 200.0}},
         r"lai = 9: crowns cover 0.21 of the ground, so \[0.045, 1.8\] m2 m-2 is allowed; more or older",
     ),
-    "unknown boundary": ({"boundary": "warm"}, r"boundary 'warm': allowed are sampled, balanced"),
+    "unknown boundary": ({"boundary": "warm"}, r"boundary 'warm': allowed are sampled, balanced, and a temp"),
     "boundary in kelvin": ({"boundary": 270.0}, r"boundary = 270: a temperature in \[-13.15, 11.85\] degC, or a name"),
     "two boundaries": (
         {"boundary": -1.0, "site": {"deep_boundary_temperature_k": 270.0}},

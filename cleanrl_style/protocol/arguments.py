@@ -66,7 +66,8 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
     with refusing("--eval-episodes"):
         evaluation_seeds(task, args.eval_episodes)
     if not weights or len(set(weights)) < len(weights):
-        fail("--eval-weights must name at least one weight, and none twice")
+        given = " ".join(str(weight) for weight in args.eval_weights)
+        fail(f"--eval-weights {given}: at least one weight, and none twice, is allowed")
     for package in getattr(args, "track", ()):
         if importlib.util.find_spec(package) is None:
             fail(f"--track {package}: the package is not installed (pip install {package})")

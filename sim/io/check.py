@@ -23,7 +23,9 @@ NOON_WITHIN_H = 3.0
 def interval_of(forcing) -> int:
     """Minutes from row to row. Raises ValueError for what has no regular local solar times, and for daily weather."""
     if not isinstance(forcing, pd.DataFrame) or not isinstance(forcing.index, pd.DatetimeIndex):
-        raise ValueError("forcing: a DataFrame with a DatetimeIndex is allowed")
+        raise ValueError(
+            "forcing: a DataFrame with a DatetimeIndex is allowed, which sim.read_forcing makes of a file or a table"
+        )
     index = forcing.index
     if index.tz is not None:
         raise ValueError(

@@ -352,7 +352,9 @@ def _whole_days(table: Table, index: pd.DatetimeIndex, interval: int, years) -> 
         pair = (years, years) if isinstance(years, (int, np.integer)) else tuple(years) if np.ndim(years) == 1 else ()
         if len(pair) != 2 or isinstance(years, bool) or not all(isinstance(y, (int, np.integer)) for y in pair):
             raise ValueError(f"years: a year or (first, last) is allowed, got {years!r}")
-        if pair[0] > pair[1] or pair[0] not in whole or pair[1] not in whole:
+        if pair[0] > pair[1]:
+            raise ValueError(f"years = {years!r}: the first year has to come first")
+        if pair[0] not in whole or pair[1] not in whole:
             raise ValueError(f"years = {years!r}: {have}")
         start, stop = begins(pair[0]), begins(pair[1] + 1)
     else:

@@ -1,6 +1,7 @@
 """The rows of a record, from a file or from memory, and how an error names one of them."""
 
 import gzip
+import re
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -38,7 +39,8 @@ class Table:
             wrong |= np.array([isinstance(value, (bool, np.bool_)) for value in texts])
         if wrong.any():
             row = int(np.argmax(wrong))
-            raise ValueError(f"{self.where(row)}: {name} is {texts.iloc[row]!r}; a number is allowed")
+            comma = " with a decimal point" if re.fullmatch(r"[+-]?\d+,\d+", str(texts.iloc[row])) else ""
+            raise ValueError(f"{self.where(row)}: {name} is {texts.iloc[row]!r}; a number{comma} is allowed")
         return np.where(values <= NO_NUMBER, np.nan, values)
 
 

@@ -391,6 +391,8 @@ def check_choice(actions, label: str | None, sites: int, one: Episodes) -> tuple
         done = digest(choose(actions, *probes(one)).astype(np.int64))
         name = getattr(actions, "__qualname__", type(actions).__qualname__)
         return actions, label or f"{getattr(actions, '__module__', '')}.{name} {done}"
+    if isinstance(actions, str):
+        raise ValueError(f"actions {actions!r}: a policy is allowed, which cleanrl_style.protocol.load_policy loads")
     given = as_array(actions)
     if given.shape not in ((), (one.years,), (sites, one.years)):
         raise ValueError(

@@ -204,7 +204,11 @@ class Objective:
         shown = {name: column.view() for name, column in year.items()}
         for column in shown.values():
             column.flags.writeable = False
-        value = np.asarray(self.value(shown))
+        try:
+            value = np.asarray(self.value(shown))
+        except KeyError as error:
+            error.add_note(f"objective {self.name}: columns of the record are {', '.join(shown)}")
+            raise
         number = len(year["carbon_reward"])
         if value.shape != (number,) or value.dtype.kind not in "biuf" or not np.isfinite(value).all():
             raise ValueError(f"objective {self.name}: an array of {number} finite numbers is allowed, got {value!r}")
