@@ -100,8 +100,8 @@ def policy_file(run_or_name) -> Path:
         path = ships.get(str(run_or_name), path)
     if not path.is_file():
         raise FileNotFoundError(
-            f"{run_or_name or repr(str(run_or_name))}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a policy that "
-            f"ships ({', '.join(ships) or 'none does yet'})"
+            f"{run_or_name or repr('')}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a "
+            f"policy that ships ({', '.join(ships) or 'none does yet'})"
         )
     return path
 
