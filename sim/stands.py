@@ -275,7 +275,7 @@ class Stands:
             for stand, its_like in zip(stands, stands[once[alike]], strict=True):
                 for streams in (self._weather, self._disturbance):
                     streams[stand].bit_generator.state = streams[its_like].bit_generator.state
-            state, record, rows = state[alike], record[alike], rows[alike] if daily else None
+            state, record, rows = state[alike], record[alike], None if rows is None else rows[alike]
         self.state[stands] = state
         self.record[stands] = record
         self.years[stands] += 1
