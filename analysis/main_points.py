@@ -21,7 +21,7 @@ BEST_PLAN, DECIDUOUS = "best_constant_mix", "dense_deciduous"
 PLANTING = ("plus_100", "")
 LEARNED = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum", "ppo_group")
 """Rows of the README below the plans that look at nothing."""
-SPLITS = 1000
+SPLITS = 1000  # of the test sites into random halves
 NOT_RUN = "Not run yet: `python analysis/reproduce.py --only main balanced`.\n"
 
 
