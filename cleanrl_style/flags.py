@@ -7,6 +7,7 @@ import atexit
 import contextlib
 import dataclasses
 import errno
+import gc
 import importlib.util
 import io
 import itertools
@@ -129,6 +130,8 @@ analysis/make_tables.py sets it beside other runs."""
 def parse(arguments: type):
     """The command line as an instance of `arguments`; a bad flag or value ends the script with one line."""
     prepare_output()
+    # the million objects that imports make all stay: to search them for garbage time and again is a third of a start
+    gc.set_threshold(20_000, 20, 20)
     require("tyro", "matplotlib", "moocore", *(["torch"] if hasattr(arguments, "total_timesteps") else []))
     import tyro
 

@@ -1,5 +1,6 @@
 """Gains, the score, the returns that it is measured by, and what a run says of them at its end."""
 
+import tokenize
 from pathlib import Path
 
 import numpy as np
@@ -173,7 +174,15 @@ def test_the_fingerprint_is_of_what_numbers_depend_on(task, monkeypatch):
     source = reference.bare('"""Of x."""\n\nx = "# 1"  # one\n\n\ndef f():\n    """Two."""\n    return x\n')
     assert source == 'x = "# 1"\ndef f():\n    return x'
     assert reference.bare("x = 1\n") != reference.bare("x = 2\n")
-    assert all((Path(sim.__file__).parent / name).exists() for name in reference.NO_PHYSICS)
+    simulator = Path(sim.__file__).parent
+    assert all((simulator / name).exists() for name in reference.NO_PHYSICS)
+    for path in simulator.rglob("*.py"):
+        with path.open(encoding="utf-8") as file:
+            comments = [
+                token.string for token in tokenize.generate_tokens(file.readline) if token.type == tokenize.COMMENT
+            ]
+        found = reference.TEXT_OR_COMMENT.finditer(path.read_text(encoding="utf-8"))
+        assert [one[0] for one in found if one["text"] is None] == comments
 
 
 def test_the_same_returns_have_the_same_bytes(tmp_path):
