@@ -3,8 +3,8 @@
     python analysis/scaling.py [--quick] [--stands 16 4096 ...] [--threads 1 2 ...]
 
 Writes results/scaling.csv and prints it. A figure is the median of repeats that take turns. Stands are 64 spun-up ones,
-repeated, each a year older at every repeat. Efficiency is of a thread of many, compared with one thread and as many
-stands. The machine is to be idle: times are a clock's, not the processor's.
+repeated under different weather, each a year older at every repeat. Efficiency is of a thread of many, compared with
+one thread and as many stands. The machine is to be idle: times are a clock's, not the processor's.
 """
 
 import statistics
@@ -55,11 +55,14 @@ class Args:
 
 
 def repeated(first: sim.Stands, number: int, **kwargs) -> sim.Stands:
-    """So many stands in the states of the first ones, in turn."""
+    """So many stands in the states of the first ones, in turn, each with weather of its own: of stands that are alike
+    in all, one alone would be simulated."""
     which = np.arange(number) % first.number
     stands = sim.Stands(number, **kwargs)
     saved = first.get_state().items()
-    stands.set_state({k: v[which] if isinstance(v, np.ndarray) else [v[i] for i in which] for k, v in saved})
+    state = {k: v[which] if isinstance(v, np.ndarray) else [v[i] for i in which] for k, v in saved}
+    state["weather"] = [np.random.default_rng(k).bit_generator.state for k in range(number)]
+    stands.set_state(state)
     return stands
 
 

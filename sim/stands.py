@@ -7,6 +7,7 @@ all that a year depends on, as those of policies that have not parted yet, are s
 """
 
 import os
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -285,14 +286,22 @@ class Stands:
         """Positions of the first of stands that are alike in all that the year depends on; for each stand, its place
         among them."""
         each = np.arange(len(stands))
-        asked = [(action, row.tobytes()) for action, row in zip(actions.tolist(), parameters, strict=True)]
-        if len(set(asked)) == len(stands):
-            return each, each
+        keys: list[tuple] = list(zip(actions.tolist(), map(bytes, parameters), strict=True))
+        for more in (self._state_of, self._streams_of):  # the dearer, of those alone that are alike so far
+            number = Counter(keys)
+            if len(number) == len(stands):
+                return each, each
+            keys = [(*key, more(stand)) if number[key] > 1 else key for key, stand in zip(keys, stands, strict=True)]
         first: dict[tuple, int] = {}
-        for k, stand in enumerate(stands):
-            streams = (repr(of_all[stand].bit_generator.state) for of_all in (self._weather, self._disturbance))
-            each[k] = first.setdefault((*asked[k], self.state[stand].tobytes(), *streams), k)
+        for k, key in enumerate(keys):
+            each[k] = first.setdefault(key, k)
         return np.unique(each, return_inverse=True)
+
+    def _state_of(self, stand) -> bytes:
+        return self.state[stand].tobytes()
+
+    def _streams_of(self, stand) -> str:
+        return repr([of_all[stand].bit_generator.state for of_all in (self._weather, self._disturbance)])
 
     def parameters_of_year(self, stands) -> np.ndarray:
         """`parameters` of stands (stands, fields), with what a scenario makes of the year to come."""
