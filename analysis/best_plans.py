@@ -126,16 +126,9 @@ def study(task: protocol.Task, seed: int, budget: int, search_seed: int, played=
     table.insert(2, "found", np.arange(1, len(table) + 1))
     half = table[table.found <= budget // 2]
     for name, of in (("front", table), ("half", half)):
-        table[name] = table.index.isin(of.index[is_undominated(of[columns].to_numpy())])
+        table[name] = table.index.isin(of.index[fronts.is_nondominated(of[columns].to_numpy())])
     table["constant"] = [len(set(plan)) == 1 for plan in tried]
     return table[table.front | table.half | table.constant]
-
-
-def is_undominated(returns: np.ndarray) -> np.ndarray:
-    """Whether no other point dominates each of the returns (n, m); of equal ones the first alone."""
-    import moocore
-
-    return moocore.is_nondominated(returns, maximise=True)
 
 
 def weights_of(task: protocol.Task) -> np.ndarray:

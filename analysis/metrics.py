@@ -17,6 +17,7 @@ from cleanrl_style.protocol.fronts import (  # noqa: F401
     cardinality,
     expected_utility,
     hypervolume,
+    is_nondominated,
     nondominated,
     objectives_of,
     return_columns,

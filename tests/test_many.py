@@ -114,6 +114,8 @@ def test_a_fixed_strategy_and_wrong_answers():
         sim.simulate_many(sites, lambda observations, masks: np.full(len(masks), 25), **COARSE)
     with pytest.raises(ValueError, match="policy: finite probabilities"):
         sim.simulate_many(sites, lambda observations, masks: masks * np.nan, **COARSE)
+    with pytest.raises(ValueError, match="a function of observations and valid actions"):
+        sim.simulate_many(sites, lambda observations: np.zeros(len(observations), int), **COARSE)
 
 
 @pytest.mark.parametrize("where", ["creation", "play", "write", "end"])

@@ -224,8 +224,7 @@ def weight_points(ax, replicates, marker="o"):
             linewidths=0,
         )
     front = mean_front(replicates)
-    best = front[[tuple(point) in set(map(tuple, metrics.nondominated(front))) for point in front.to_numpy()]]
-    best = best.sort_values("thaw_return")
+    best = front[metrics.is_nondominated(front)].sort_values("thaw_return")
     ax.plot(best.thaw_return, best.carbon_return, color="#888888", linewidth=0.8, zorder=1)
     points = ax.scatter(
         front.thaw_return,

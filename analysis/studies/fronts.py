@@ -17,7 +17,7 @@ import pandas as pd
 
 import sim
 from analysis import paths, stored
-from analysis.metrics import hypervolume
+from analysis.metrics import hypervolume, is_nondominated
 from analysis.studies import genes as plan_genes
 from analysis.studies import open_loop
 from analysis.studies.genes import Budget
@@ -111,9 +111,7 @@ def study(site_seed: int, budget: Budget, seed: int, years: int, mechanisms=None
 def plan_means(gains: pd.DataFrame, kind: str) -> pd.DataFrame:
     """Means over the weathers of one kind of plans, those that none of the kind dominates, by rising carbon gain."""
     plans = gains[gains.kind == kind].groupby("actions")[RETURNS + GAINS + STAND].mean()
-    import moocore
-
-    front = plans[moocore.is_nondominated(plans[RETURNS].to_numpy(), maximise=True)]
+    front = plans[is_nondominated(plans[RETURNS])]
     front = front.assign(conifer_share=front.planted_conifers_ha / front.planted_stems_ha)
     return front.sort_values(GAINS[0])
 

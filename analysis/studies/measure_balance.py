@@ -9,10 +9,10 @@ carbon_scale; thaw as rewarded.
 
 from dataclasses import dataclass
 
-import moocore
 import numpy as np
 
 import boreal_env
+from analysis.metrics import is_nondominated
 from baselines_heuristic import conifer_restoration, obeying, plus_100, target_density, zero_change
 from cleanrl_style import protocol
 from cleanrl_style.protocol import final_info
@@ -57,7 +57,7 @@ def play(args: Args, **reward) -> np.ndarray:
 
 def unbeaten(sums: np.ndarray) -> np.ndarray:
     """Which policies no other beats in both returns on a site, each once; bool (policies, sites)."""
-    return np.column_stack([moocore.is_nondominated(site[:, 1:], maximise=True) for site in sums.swapaxes(0, 1)])
+    return np.column_stack([is_nondominated(site[:, 1:]) for site in sums.swapaxes(0, 1)])
 
 
 def within_site_spread(sums: np.ndarray, chosen: np.ndarray) -> np.ndarray:

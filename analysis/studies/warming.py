@@ -136,8 +136,7 @@ def fronts(plans: pd.DataFrame) -> dict[str, pd.DataFrame]:
     found = {}
     for scenario, rows in plans.groupby("scenario", sort=False):
         means = rows.groupby("action")[open_loop.RETURNS].mean()
-        best = {tuple(point) for point in metrics.nondominated(means.to_numpy())}
-        found[scenario] = means[[tuple(point) in best for point in means.to_numpy()]].sort_values("carbon_return")
+        found[scenario] = means[metrics.is_nondominated(means)].sort_values("carbon_return")
     return found
 
 

@@ -67,11 +67,16 @@ def evaluation_weights(number: int) -> tuple:
 # -------------------------------------------------------------------------------------------------------- fronts
 
 
-def nondominated(points: np.ndarray) -> np.ndarray:
-    """The points that no other point dominates, (k, m), without duplicates."""
+def is_nondominated(points: np.ndarray) -> np.ndarray:
+    """Whether no other point dominates each of the points (n, m), bool (n,); of equal ones the first alone."""
     import moocore
 
-    return moocore.filter_dominated(np.asarray(points, dtype=float), maximise=True)
+    return moocore.is_nondominated(np.asarray(points, dtype=float), maximise=True)
+
+
+def nondominated(points: np.ndarray) -> np.ndarray:
+    """The points that no other point dominates, (k, m), without duplicates."""
+    return np.asarray(points, dtype=float)[is_nondominated(points)]
 
 
 def hypervolume(points: np.ndarray, reference: float | Sequence[float] = REFERENCE_POINT) -> float:

@@ -226,8 +226,13 @@ def play(part: Plan) -> dict[str, np.ndarray]:
 
 def choose(policy: Callable, observations: np.ndarray, masks: np.ndarray, returns: np.ndarray) -> np.ndarray:
     """A policy's actions (n,); ValueError if it gives something else."""
-    third = [returns.copy()] if asks_for_returns(policy) else []
-    answer = np.asarray(policy(observations, masks, *third))
+    arguments = (observations, masks, returns.copy())[: 2 + asks_for_returns(policy)]
+    try:
+        inspect.signature(policy).bind(*arguments)
+    except TypeError as error:
+        allowed = "a function of observations and valid actions, and of returns if it asks for them, is allowed"
+        raise ValueError(f"policy: {allowed}; {error}") from None
+    answer = np.asarray(policy(*arguments))
     if answer.shape == masks.shape:
         if not np.isfinite(answer).all():
             raise ValueError("policy: finite probabilities of actions are allowed, got NaN or infinity")
