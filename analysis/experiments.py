@@ -257,11 +257,12 @@ def variants(seeds) -> list[Job]:
 def budgets(seeds) -> list[Job]:
     """Group PPO with a third of the budget, and with three times and a bit of it; the main table has the whole.
 
-    The longest also with lambda 1 for both objectives, which does not lean on the critic.
+    The longest also without relabelling, and with lambda 1 for both objectives.
     """
     changes = (
         {"total_timesteps": 100_000},
         {"total_timesteps": 1_000_000},
+        {"total_timesteps": 1_000_000, "relabelings": 0},
         {"total_timesteps": 1_000_000, "gae_lambda": (1.0,)},
     )
     return [trained("budgets", "ppo_group", seed, **change) for change in changes for seed in seeds_of(5, seeds)]
