@@ -70,8 +70,8 @@ def as_myst(app, docname, source):
     file = ROOT / f"{docname}.ipynb"
     if file.exists():
         notebook = json.loads(text)
-        source_of_file = f"{{download}}`{file.name} <{file.name}>`"
-        last = {"cell_type": "markdown", "id": "file", "metadata": {}, "source": source_of_file}
+        link = f"{{download}}`{file.name} <{file.name}>`"
+        last = {"cell_type": "markdown", "id": "file", "metadata": {}, "source": link}
         text = json.dumps({**notebook, "cells": [*notebook["cells"], last]})
     source[0] = re.sub(r"(\.\. automodule:: (\S+)\n(?: +:.*\n)+)", lambda found: found[1] + others(found[2]), text)
 

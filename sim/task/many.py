@@ -226,13 +226,8 @@ def play(part: Plan) -> dict[str, np.ndarray]:
 
 def choose(policy: Callable, observations: np.ndarray, masks: np.ndarray, returns: np.ndarray) -> np.ndarray:
     """A policy's actions (n,); ValueError if it gives something else."""
-    arguments = (observations, masks, returns.copy())[: 2 + asks_for_returns(policy)]
-    try:
-        inspect.signature(policy).bind(*arguments)
-    except TypeError as error:
-        allowed = "a function of observations and valid actions, and of returns if it asks for them, is allowed"
-        raise ValueError(f"policy: {allowed}; {error}") from None
-    answer = np.asarray(policy(*arguments))
+    third = [returns.copy()] if asks_for_returns(policy) else []
+    answer = np.asarray(policy(observations, masks, *third))
     if answer.shape == masks.shape:
         if not np.isfinite(answer).all():
             raise ValueError("policy: finite probabilities of actions are allowed, got NaN or infinity")
@@ -393,6 +388,11 @@ def check_choice(actions, label: str | None, sites: int, one: Episodes) -> tuple
                 f"policy {getattr(actions, 'name', '')!r} is of another world: it observes {size} entries, here are "
                 f"{observed}; give the arguments of its training, such as objectives and observation_groups"
             )
+        try:
+            inspect.signature(actions).bind(*range(2 + asks_for_returns(actions)))
+        except TypeError as error:
+            allowed = "a function of observations and valid actions, and of returns if it asks for them, is allowed"
+            raise ValueError(f"policy: {allowed}; {error}") from None
         done = digest(choose(actions, *probes(one)).astype(np.int64))
         name = getattr(actions, "__qualname__", type(actions).__qualname__)
         return actions, label or f"{getattr(actions, '__module__', '')}.{name} {done}"
