@@ -17,6 +17,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.machine import machine
+from analysis.paths import make_writable
 from cleanrl_style import protocol
 
 ROOT = Path(__file__).parents[1]
@@ -75,6 +76,7 @@ def follow(wanted: list[str], folder: Path, environment: dict[str, str]) -> tupl
 
 def main(args: Args) -> None:
     """Clone, run, write."""
+    make_writable("--results", args.results)
     wanted = steps(commands((ROOT / "README.md").read_text(encoding="utf-8")))
     with tempfile.TemporaryDirectory() as work:
         folder = Path(work, "borearl")
