@@ -151,11 +151,9 @@ def group(seeds) -> list[Job]:
         {"group_size": 2},
         {"hide_site": True},
         {"objective_logits": False},
-        {"relabelings": 0},
         {"ent_coef": 0.0},
         {"gae_lambda": (0.95,)},
         {"reward_scales": REWARD_SCALES},
-        {"relabelings": 0, "env_id": BALANCED},
     )
     return [trained("group", "ppo_group", seed, **change) for seed in seeds_of(5, seeds) for change in changes]
 
@@ -255,15 +253,11 @@ def variants(seeds) -> list[Job]:
 
 
 def budgets(seeds) -> list[Job]:
-    """Group PPO with a third of the budget, and with three times and a bit of it; the main table has the whole.
-
-    The longest also without relabelling, and with lambda 1 for both objectives.
-    """
+    """Group PPO with a third of the budget, and with three times and a bit of it; the main table has the whole."""
     changes = (
         {"total_timesteps": 100_000},
         {"total_timesteps": 1_000_000},
-        {"total_timesteps": 1_000_000, "relabelings": 0},
-        {"total_timesteps": 1_000_000, "gae_lambda": (1.0,)},
+        {"total_timesteps": 1_000_000, "env_id": BALANCED},
     )
     return [trained("budgets", "ppo_group", seed, **change) for change in changes for seed in seeds_of(5, seeds)]
 

@@ -47,7 +47,6 @@ LIMITS = {
     "rollout_steps": (1, 10**9),
     "minibatch_size": (2, 10**9),
     "update_epochs": (1, 10**6),
-    "relabelings": (0, 10**6),
     "clip_coef": (1e-12, 10),
     "ent_coef": (0, 10),
     "vf_coef": (0, 10),

@@ -44,10 +44,8 @@ class Args:
     """discount factor"""
     gae_lambda: tuple[float, ...] | None = None
     """lambda of generalised advantage estimation, one or one for each objective (None: 0.95, and 1 for thaw)"""
-    relabelings: int = 3
-    """how often a rollout is learned from once more, as if its stands had had other preferences"""
     minibatch_size: int = 640
-    """largest number of transitions in a minibatch, not counting what is relabelled"""
+    """largest number of transitions in a minibatch"""
     update_epochs: int = 5
     """passes over the rollout in an update"""
     clip_coef: float = 0.2
@@ -221,29 +219,8 @@ def spread_preferences(num_groups, group_size, num_objectives):
     return weights.reshape(-1, num_objectives - 1)
 
 
-def relabel(agent, obs, masks, actions, logprobs, advantages):
-    """Observations, log-probabilities and weighed advantages of a rollout whose stands have other preferences, flat.
-
-    What an action adds to each objective does not hang on the preference, but for the policy that follows. An advantage
-    counts by how much more likely its action is under the new preference, at most twice.
-    """
-    preferences = spread_preferences(obs.shape[1], 1, advantages.shape[2])
-    obs = obs.clone()
-    obs[:, :, : preferences.shape[1]] = torch.from_numpy(preferences)
-    weights = np.column_stack([preferences, 1.0 - preferences.sum(axis=1)])
-    weights = torch.from_numpy(weights).float().expand(len(obs), -1, -1).flatten(0, 1)
-    obs = obs.flatten(0, 1)
-    with torch.no_grad():
-        new_logprobs = agent.get_logprobs(obs, masks.flatten(0, 1)).gather(1, actions.flatten()[:, None]).squeeze(1)
-    ratio = (new_logprobs - logprobs.flatten()).exp().clamp(max=2.0)
-    return obs, new_logprobs, ratio * weigh_advantages(advantages.flatten(0, 1), weights)
-
-
-def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, own, args):
-    """Policy loss, value loss, entropy, two estimates of the KL divergence and clip fraction of a minibatch.
-
-    own : 1 where the preference is that of the episode, 0 where it is not and the value is not learned from.
-    """
+def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
+    """Policy loss, value loss, entropy, two estimates of the KL divergence and clip fraction of a minibatch."""
     _, logprob, entropy, value = agent.get_action_and_value(x, mask, action)
     logratio = logprob - old_logprob
     ratio = logratio.exp()
@@ -254,8 +231,7 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, own, args
     pg_loss = torch.max(pg_loss1, pg_loss2).mean()
 
     # Value loss
-    v_loss = 0.5 * (((value - target) / agent.value_std) ** 2).mean(dim=1)
-    v_loss = (v_loss * own).sum() / own.sum().clamp(min=1.0)
+    v_loss = 0.5 * (((value - target) / agent.value_std) ** 2).mean(dim=1).mean()
 
     with torch.no_grad():
         # http://joschu.net/blog/kl-approx.html
@@ -415,18 +391,11 @@ if __name__ == "__main__":
             b_advantages = weigh_advantages(advantages.flatten(0, 1), weights.flatten(0, 1))
             b_returns = returns.flatten(0, 1)
             b_values = values.flatten(0, 1)
-
-            # once more under other preferences
-            batches = [(b_obs, b_masks, b_actions, b_logprobs, b_advantages, b_returns, torch.ones(len(b_obs)))]
-            for _ in range(args.relabelings):
-                new_obs, new_logprobs, new_advantages = relabel(agent, obs, masks, actions, logprobs, advantages)
-                other = torch.zeros(len(b_obs))
-                batches.append((new_obs, b_masks, b_actions, new_logprobs, new_advantages, b_returns, other))
-            batch = [torch.cat(parts) for parts in zip(*batches, strict=True)]
-            b_inds = np.arange(len(batch[0]))
+            b_inds = np.arange(num_steps * args.num_envs)
 
             # Optimizing the policy and value network
-            num_minibatches = math.ceil(len(b_obs) / args.minibatch_size)
+            num_minibatches = math.ceil(len(b_inds) / args.minibatch_size)
+            batch = (b_obs, b_masks, b_actions, b_logprobs, b_advantages, b_returns)
             losses = []
             y_pred, y_true = b_values, b_returns
             for epoch in range(args.update_epochs):

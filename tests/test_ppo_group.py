@@ -10,7 +10,7 @@ from scripts import ROOT, run_script
 from toy_env import optimal_return
 
 from cleanrl_style import protocol
-from cleanrl_style.ppo_group import Agent, less_the_others, ppo_losses, relabel, spread_preferences, weigh_advantages
+from cleanrl_style.ppo_group import Agent, less_the_others, ppo_losses, spread_preferences, weigh_advantages
 from cleanrl_style.protocol import run_folder
 
 SCRIPT = "cleanrl_style/ppo_group.py"
@@ -85,49 +85,14 @@ def test_values_are_of_their_unit_and_the_loss_of_none():
     x, mask = torch.randn(6, 3), torch.ones(6, 25, dtype=torch.bool)
     batch = (torch.zeros(6, dtype=torch.long), torch.zeros(6), torch.zeros(6))
     raw, target = agent.get_value(x).detach(), torch.randn(6, 2)
-    own, args = torch.ones(6), SimpleNamespace(clip_coef=0.2)
-    loss = ppo_losses(agent, x, mask, *batch, target, own, args)[1]
+    args = SimpleNamespace(clip_coef=0.2)
+    loss = ppo_losses(agent, x, mask, *batch, target, args)[1]
     agent.value_mean += torch.tensor([3.0, -20.0])
     agent.value_std *= torch.tensor([0.1, 10.0])
     torch.testing.assert_close(agent.get_value(x), raw * agent.value_std + agent.value_mean)
     target = target * agent.value_std + agent.value_mean
-    scaled = ppo_losses(agent, x, mask, *batch, target, own, args)[1]
+    scaled = ppo_losses(agent, x, mask, *batch, target, args)[1]
     torch.testing.assert_close(scaled, loss)
-
-
-def test_a_relabelled_rollout_has_other_preferences_and_all_else_as_it_was():
-    agent = agent_of_three_entries()
-    with torch.no_grad():
-        agent.actor[-2].weight.normal_()  # probabilities hang on the preference
-    obs, masks = torch.rand(4, 6, 3), torch.ones(4, 6, 25, dtype=torch.bool)
-    with torch.no_grad():
-        actions, logprobs, *_ = agent.get_action_and_value(obs.flatten(0, 1), masks.flatten(0, 1))
-    advantages = torch.randn(4, 6, 2)
-    np.random.seed(0)  # noqa: NPY002 (that generator is the scripts')
-    actions = actions.view(4, 6)
-    new, new_logprobs, weighed = relabel(agent, obs, masks, actions, logprobs.view(4, 6), advantages)
-    new = new.view(4, 6, 3)
-    assert torch.equal(new[..., 1:], obs[..., 1:])
-    assert (new[:, :, 0] == new[0, :, 0]).all() and len(new[0, :, 0].unique()) == 6  # one of a stand's own, all years
-    everything = agent.get_logprobs(new.flatten(0, 1), masks.flatten(0, 1))
-    torch.testing.assert_close(new_logprobs, everything.gather(1, actions.flatten()[:, None])[:, 0])
-    ratio = (new_logprobs - logprobs).exp()
-    assert ratio.max() > 2.0 > ratio.min()
-    weights = torch.stack([new[..., 0], 1 - new[..., 0]], dim=-1).flatten(0, 1)
-    torch.testing.assert_close(
-        weighed, ratio.clamp(max=2.0) * weigh_advantages(advantages.flatten(0, 1), weights), rtol=1e-4, atol=1e-5
-    )
-
-
-def test_the_value_learns_from_an_episode_s_own_preference_alone():
-    agent = agent_of_three_entries()
-    x, mask, args = torch.randn(6, 3), torch.ones(6, 25, dtype=torch.bool), SimpleNamespace(clip_coef=0.2)
-    batch, target = (torch.zeros(6, dtype=torch.long), torch.zeros(6), torch.zeros(6)), torch.randn(6, 2)
-    own = torch.tensor([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    half = [part[:3] for part in (x, mask, *batch, target, own)]
-    torch.testing.assert_close(
-        ppo_losses(agent, x, mask, *batch, target, own, args)[1], ppo_losses(agent, *half, args)[1]
-    )
 
 
 def agent_of_three_entries(**arguments):
@@ -225,7 +190,6 @@ def test_killed_and_resumed_is_as_never_killed(arguments, tmp_path, monkeypatch)
     [
         (("--group-size", 3), "--group-size 3: a divisor of --num-envs 4 is allowed"),
         (("--group-size", 0), r"--group-size must lie in \[1, 1000\], not 0"),
-        (("--relabelings", -1), r"--relabelings must lie in \[0, 1000000\], not -1"),
         (("--gae-lambda", 1, 1, 1), r"--gae-lambda: 1 number or 2 are allowed, not \[1.0, 1.0, 1.0\]"),
         (("--gae-lambda", 1.5, 1), r"--gae-lambda must lie in \[0, 1\], not 1.5"),
     ],
@@ -251,4 +215,4 @@ def test_its_difference_to_gated_ppo_is_as_long_as_its_page_says():
     gone, new = (sum(line.startswith(mark) for line in lines) for mark in "<>")
     page = (ROOT / "docs" / "algorithms" / "ppo_group.md").read_text(encoding="utf-8")
     assert f"{gone} lines gone, {new} new" in page
-    assert gone + new < 240
+    assert gone + new < 200
