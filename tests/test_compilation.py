@@ -5,7 +5,9 @@ import re
 import threading
 import time
 
+import llvmlite.binding as llvm
 import numba
+import numpy as np
 import pytest
 
 from cleanrl_style import protocol
@@ -165,3 +167,17 @@ def test_one_compiles_while_others_wait(cache, tmp_path):
         order.append("first")
     other.join()
     assert order == ["first", "second"]
+
+
+@phase
+def product(a, b, c):
+    for k in range(a.size):
+        a[k] = b[k] * c[k]
+
+
+@pytest.mark.skipif(
+    not llvm.get_host_cpu_features().get("avx512f") or llvm.get_host_cpu_name() in jit.SLOWED, reason="needs AVX-512"
+)
+def test_vectors_are_as_wide_as_the_processor_has():
+    product(*np.ones((3, 100)))
+    assert any("zmm" in text for text in product.inspect_asm().values())

@@ -15,7 +15,7 @@ from cleanrl_style.ppo_gated import Args
 COUNTS = {
     "main": 1 + len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
     "balanced": len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
-    "group": 45,
+    "group": 35,
     "outside": 10 * len(methods.OUTSIDE),
     "planners": 20,
     "worlds": 15,
@@ -26,7 +26,7 @@ COUNTS = {
     "variants": 35,
     "mechanisms": 2,
     "difficulty": 2,
-    "budgets": 20,
+    "budgets": 15,
 }
 
 
