@@ -231,7 +231,7 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
     pg_loss = torch.max(pg_loss1, pg_loss2).mean()
 
     # Value loss
-    v_loss = 0.5 * (((value - target) / agent.value_std) ** 2).mean(dim=1).mean()
+    v_loss = 0.5 * (((value - target) / agent.value_std) ** 2).mean()
 
     with torch.no_grad():
         # http://joschu.net/blog/kl-approx.html
