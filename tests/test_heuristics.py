@@ -72,7 +72,8 @@ def test_run_folder(script, tmp_path):
 def test_no_torch_is_needed(monkeypatch):
     there = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else there(name))
-    assert {*run_folder.versions()} == {"python", "numpy", "numba", "gymnasium", "pandas", "matplotlib", "moocore"}
+    packages = {"numpy", "numba", "gymnasium", "pandas", "matplotlib", "moocore"}
+    assert {*run_folder.versions()} == packages | {"python", "processor"}
 
 
 def test_one_simulation_stands_for_every_weight(tmp_path):

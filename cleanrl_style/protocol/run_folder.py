@@ -22,6 +22,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
+from llvmlite.binding import get_host_cpu_name
 
 from cleanrl_style.flags import fail
 from cleanrl_style.protocol import tracking, training_envs
@@ -503,11 +504,14 @@ def folder_name(env_id: str, changed: dict) -> str:
 
 
 def versions() -> dict:
-    """Versions of Python and of the packages that the numbers depend on."""
+    """What numbers depend on beside the code: versions of Python and packages, and the processor, by LLVM's name.
+
+    The simulator's numbers are the same on all; torch's are not, in the last bit.
+    """
     packages = ("numpy", "numba", "gymnasium", "torch", "pandas", "matplotlib", "moocore")
     there = [name for name in packages if importlib.util.find_spec(name)]  # fixed strategies do without torch
     found = {name: importlib.metadata.version(name) for name in there}
-    return {"python": platform.python_version(), **found}
+    return {"python": platform.python_version(), **found, "processor": get_host_cpu_name()}
 
 
 def commit() -> str | None:
