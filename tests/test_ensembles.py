@@ -8,8 +8,9 @@ from analysis.studies import ensembles
 
 
 def test_sets_are_disjoint_and_whole():
-    assert [list(one) for one in ensembles.sets_of(5)] == [[1, 2, 3, 4, 5], [6, 7, 8, 9, 10]]
-    assert len(ensembles.sets_of(3)) == 3 and len(ensembles.sets_of(10)) == 1
+    seeds = [1, 6, 7, 8, 9, 10]
+    assert ensembles.sets_of(seeds, 3) == [[1, 6, 7], [8, 9, 10]]
+    assert len(ensembles.sets_of(seeds, 4)) == 1 and ensembles.sets_of(seeds, 6) == [seeds]
 
 
 def test_what_most_are_sure_of_is_chosen_and_nothing_invalid():

@@ -4,8 +4,9 @@
 
 Seeds of one method differ, though they learn the same. Is that chance, of sites, dice and actions that a training
 happened to see? Then the mean of several policies is better than any of them: chance is averaged away, and what all
-have learnt stays. Here the mean of the logarithms of their probabilities chooses. Disjoint sets of the archived seeds
-play the evaluation's sites. Leaves results/studies/ensembles.csv, a row a task, set and site: the scalarised gain.
+have learnt stays. Here the mean of the logarithms of their probabilities chooses. Disjoint sets of the seeds whose
+policies are archived play the evaluation's sites. Leaves results/studies/ensembles.csv, a row a task, set and site: the
+scalarised gain.
 """
 
 from dataclasses import dataclass
@@ -21,8 +22,6 @@ from cleanrl_style.protocol import fronts, reference
 
 SCRIPT = "ppo_group"
 TASKS = (experiments.GENERALIST, experiments.BALANCED)
-SEEDS = 10
-SIZES = (2, 5, 10)  # of a set; single seeds are the main table's
 LEAST = 1e-12  # a probability of 0 would be a veto of one for all
 
 
@@ -33,12 +32,12 @@ class Args:
     episodes: int = 200
     """evaluation episodes per weight"""
     quick: bool = False
-    """2 episodes, the sets of ten: to see that it runs, into results/quick/studies"""
+    """2 episodes, all seeds together: to see that it runs, into results/quick/studies"""
 
 
-def sets_of(size: int) -> list[range]:
+def sets_of(seeds: list[int], size: int) -> list[list[int]]:
     """Disjoint sets of training seeds, as many as there are."""
-    return [range(first, first + size) for first in range(1, SEEDS - size + 2, size)]
+    return [seeds[first : first + size] for first in range(0, len(seeds) - size + 1, size)]
 
 
 def together(policies: list):
@@ -68,7 +67,7 @@ def path(quick: bool = False) -> Path:
 
 def main(args: Args) -> None:
     """Play every set on both tasks, and write the table."""
-    episodes, sizes = (2, SIZES[-1:]) if args.quick else (args.episodes, SIZES)
+    episodes = 2 if args.quick else args.episodes
     archive = paths.there(paths.archive())
     made_by = {"episodes": episodes, "physics": open_loop.fingerprint()}
     if stored.is_finished(path(args.quick), made_by):
@@ -77,13 +76,15 @@ def main(args: Args) -> None:
     tables = []
     for task_id in TASKS:
         folder = archive / SCRIPT / f"{task_id}-vectorization=lockstep"
-        policies = {seed: protocol.load_policy(folder / f"seed{seed}") for seed in range(1, SEEDS + 1)}
-        task = policies[1].task()
-        for size in sizes:
-            for seeds in sets_of(size):
-                print(f"{task_id}: seeds {seeds[0]} to {seeds[-1]}", flush=True)
-                gained = gains_of([policies[seed] for seed in seeds], task, episodes)
-                rows = {"task": task_id, "size": size, "first_seed": seeds[0], "seed": gained.index, "gain": gained}
+        seeds = sorted(int(one.parent.name.removeprefix("seed")) for one in folder.glob("seed*/policy.pt"))
+        policies = {seed: protocol.load_policy(folder / f"seed{seed}") for seed in seeds}
+        task = policies[seeds[0]].task()
+        number = len(seeds)
+        for size in (number,) if args.quick else (2, number // 2, number):  # single seeds are the main table's
+            for chosen in sets_of(seeds, size):
+                print(f"{task_id}: seeds {', '.join(map(str, chosen))}", flush=True)
+                gained = gains_of([policies[seed] for seed in chosen], task, episodes)
+                rows = {"task": task_id, "size": size, "first_seed": chosen[0], "seed": gained.index, "gain": gained}
                 tables.append(pd.DataFrame(rows))
     stored.write(path(args.quick), pd.concat(tables, ignore_index=True), made_by)
     print(f"wrote {path(args.quick)}")
