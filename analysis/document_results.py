@@ -18,7 +18,7 @@ import pandas as pd
 import sim
 from analysis import excerpts, experiments, generalisation, main_points, methods, metrics, paths, stored
 from analysis.experiments import BALANCED, GENERALIST
-from analysis.figures import learning_asymmetry, learning_curves, learning_difficulty
+from analysis.figures import learning_asymmetry, learning_curves, learning_difficulty, many_objectives
 from analysis.paper_claims.claim import FEWEST_SEEDS
 from analysis.results import Results
 from analysis.studies import ensembles
@@ -41,7 +41,7 @@ PAGES = (
     *(f"docs/algorithms/{name}.md" for name in methods.scripts(methods.CONDITIONED, methods.FIXED_WEIGHT)),
     "docs/algorithms/heuristics.md",
 )
-SECTION = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
+SECTION = re.compile(r"(<!-- results of ([\w-]+) -->\n).*?(<!-- end of results -->)", re.DOTALL)
 ENDS = (0.0, 1.0)  # weights
 HEADING = (
     "| {what} | seeds | score, greedy | score, sampled | gain | gain hypervolume | carbon, weight 0 "
@@ -395,6 +395,8 @@ FIGURES = {
         learning_difficulty,
         "Shares of the variance; effect and noise; course of the effect; episodes needed",
     ),
+    "many_objectives_boreal-timber-v0": (many_objectives, "Returns at each weight of carbon, thaw and timber"),
+    "many_objectives_boreal-four-v0": (many_objectives, "Returns at each weight of carbon, thaw, timber, biodiversity"),
 }
 OF_ALL = {"all": GENERALIST, "balanced": BALANCED}
 TABLES = {

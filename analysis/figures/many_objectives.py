@@ -22,6 +22,7 @@ CAPTION = (
 )
 
 STEM = "many_objectives"
+MADE_BY = "python analysis/reproduce.py --only worlds"
 
 
 def figures(results) -> dict:
