@@ -33,8 +33,8 @@ except ImportError:  # Windows, where two processes compile the same
 
 OPTIONS = {"error_model": "numpy", "nogil": True}
 
-# LLVM halves AVX-512's vectors on processors of Intel. Whole, sixteen lanes take a fifth less time, with the same
-# bits (docs/performance.md). The oldest slow their clock for it and keep LLVM's choice; so do the user's own settings. It is
+# LLVM halves AVX-512's vectors on processors of Intel. Whole, sixteen lanes take a fifth less time, with the same bits
+# (docs/performance.md). The oldest slow their clock for it and keep LLVM's choice; so do the user's own settings. It is
 # numba's setting for the process, read at its first compilation.
 SLOWED = ("skylake-avx512", "cascadelake", "cooperlake")
 FEATURES = numba.config.CPU_FEATURES or llvm.get_host_cpu_features().flatten()
