@@ -73,7 +73,7 @@ def test_no_torch_is_needed(monkeypatch):
     there = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else there(name))
     packages = {"numpy", "numba", "gymnasium", "pandas", "matplotlib", "moocore"}
-    assert {*run_folder.versions()} == packages | {"python", "processor"}
+    assert {*run_folder.versions()} == packages | {"python", "processor", "MKL_CBWR", "ATEN_CPU_CAPABILITY"}
 
 
 def test_one_simulation_stands_for_every_weight(tmp_path):

@@ -8,6 +8,7 @@ import importlib.metadata
 import importlib.util
 import io
 import json
+import os
 import pickle
 import platform
 import random
@@ -504,14 +505,15 @@ def folder_name(env_id: str, changed: dict) -> str:
 
 
 def versions() -> dict:
-    """What numbers depend on beside the code: versions of Python and packages, and the processor, by LLVM's name.
+    """What numbers depend on beside the code: versions of Python and packages, and how torch calculates.
 
-    The simulator's numbers are the same on all; torch's are not, in the last bit.
+    The processor, by LLVM's name, is for those on which torch cannot be told how (`cleanrl_style/__init__.py`).
     """
     packages = ("numpy", "numba", "gymnasium", "torch", "pandas", "matplotlib", "moocore")
     there = [name for name in packages if importlib.util.find_spec(name)]  # fixed strategies do without torch
     found = {name: importlib.metadata.version(name) for name in there}
-    return {"python": platform.python_version(), **found, "processor": get_host_cpu_name()}
+    arithmetic = {name: os.environ.get(name) for name in ("MKL_CBWR", "ATEN_CPU_CAPABILITY")}
+    return {"python": platform.python_version(), **found, "processor": get_host_cpu_name(), **arithmetic}
 
 
 def commit() -> str | None:
