@@ -26,8 +26,8 @@ from analysis import paths
 from boreal_env import BALANCED_WORLD
 from cleanrl_style import protocol
 from sim.block import lanes_for
+from sim.region import many
 from sim.stands import LONGEST_STEP_MINUTES, available_cores
-from sim.task import many
 
 POLICY = "ppo_group-balanced"
 COLUMNS = ("policy", "stands", "years", "step_minutes", "kills", "same_bytes", "peak_mb")

@@ -55,10 +55,10 @@ __all__ = [
 
 
 #: What needs the task, whose observations a policy sees: name -> its file, loaded when it is asked for.
-_OF_THE_TASK = {"simulate_many": "sim.task.many", "sites_on_grid": "sim.task.grid"}
+_OF_A_REGION = {"simulate_many": "sim.region.many", "sites_on_grid": "sim.region.grid"}
 
 
 def __getattr__(name: str):
-    if name in _OF_THE_TASK:
-        return getattr(import_module(_OF_THE_TASK[name]), name)
+    if name in _OF_A_REGION:
+        return getattr(import_module(_OF_A_REGION[name]), name)
     raise AttributeError(f"module 'sim' has no attribute {name!r}")

@@ -19,7 +19,8 @@ from sim.state import DAILY, DAILY_NAMES, DAYS, PARAMETER_NAMES, RECORD, RECORD_
 from sim.structure import leaf_out
 
 OUTPUTS = ("annual", "daily", "xarray")
-DEFAULT_YEARS, MOST_YEARS = 50, 10_000
+DEFAULT_YEARS, MOST_YEARS = 50, 5_000
+DATES = (1678, 2261)  # years whose nanoseconds xarray can count
 DEFAULT_MINUTES = 30
 NUMBER = (int, float, np.number)
 
@@ -123,6 +124,12 @@ def simulate(
     if time_step_minutes is None:
         time_step_minutes = max(DEFAULT_MINUTES, interval)
     years = _check_years(years, forcing, interval)
+    first_year = FIRST_YEAR if forcing is None else int(forcing.index[0].year)
+    if output == "xarray" and not DATES[0] <= first_year <= first_year + years - 1 <= DATES[1]:
+        which = f"{first_year} to {first_year + years - 1}"
+        raise ValueError(
+            f'output "xarray": years in [{DATES[0]}, {DATES[1]}] are allowed, got {which}; "daily" has all'
+        )
     given = as_array(NO_CHANGE if actions is None else actions)
     per_year = np.full(years, given) if given.ndim == 0 else given
     check_actions(per_year, years, "years")
@@ -170,7 +177,6 @@ def simulate(
         records.append(record)
         if output != "annual":
             rows.append(daily[0])
-    first_year = FIRST_YEAR if forcing is None else int(forcing.index[0].year)
     annual = _table(np.concatenate(records), RECORD_NAMES, _new_year(first_year, years), 1)
     if output == "annual":
         return annual
@@ -212,14 +218,14 @@ def _of_forcing(given: dict, forcing: pd.DataFrame) -> dict:
 
 def _check_part(days: int, output: str, overrides: dict) -> None:
     """Refuse what a part of a year does not have: annual values, and a climate."""
+    if output == "annual":
+        raise ValueError(f'output "annual": {days} days of forcing are no whole year; "daily" and "xarray" are allowed')
     lacking = [name for name in CLIMATE if name not in overrides]
     if lacking:
         raise ValueError(
             f"forcing: {days} days are no whole year, so the ground is spun up under the site's climate; "
             f"site= needs {' and '.join(lacking)}"
         )
-    if output == "annual":
-        raise ValueError(f'output "annual": {days} days of forcing are no whole year; "daily" and "xarray" are allowed')
 
 
 def _with_boundary(site: dict, boundary) -> tuple[dict, object]:

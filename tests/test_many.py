@@ -7,7 +7,7 @@ import pytest
 import boreal_env
 import sim
 from sim.block import LANES
-from sim.task import many
+from sim.region import many
 
 pytest.importorskip("zarr")
 xarray = pytest.importorskip("xarray")

@@ -175,7 +175,7 @@ def test_the_report_has_the_shift_and_what_it_leaves_and_all_is_100_percent():
 
 def test_years_are_chosen_and_29_february_is_dropped():
     forcing = sim.read_forcing(records.POKER_FLAT, years=(2012, 2013), **ALASKA)
-    assert len(forcing) == 2 * 365 * 48 and "29 February was dropped 1 times" in forcing.attrs["report"]
+    assert len(forcing) == 2 * 365 * 48 and "29 February was dropped in 1 year" in forcing.attrs["report"]
     assert len(sim.read_forcing(records.POKER_FLAT, years=2012, **ALASKA)) == 365 * 48
     part = sim.read_forcing(records.icos(90), **SWEDEN)
     assert len(part) == 90 * 48 and "mean_annual_temperature_c" not in part.attrs["site"]
@@ -479,7 +479,7 @@ BAD_ARGUMENTS = {
     "unit of what is not used": ({"units": {"WD": "deg"}}, r"units: WD is not used; used are LW_IN_F"),
     "column without a unit": (
         {"columns": {"wind_speed": "WD"}},
-        r"the unit of WD is not known; say units={'WD': ..}: m s-1",
+        r"units are not known; say units={'WD': ..}: WD in m s-1, km h-1",
     ),
     "years of another record": (
         {"years": 2020},

@@ -692,7 +692,11 @@ BAD = {
         r"moss_water_held = 0.6 has to be less than organic_porosity = 0.5",
     ),
     "half a year of age": ({"constants": {"mature_age_limit": 61.5}}, r"mature_age_limit = 61.5: a whole number"),
-    "years without end": ({"years": 10**9}, r"years = 1000000000: at most 10000 are allowed"),
+    "years without end": ({"years": 10**9}, r"years = 1000000000: at most 5000 are allowed"),
+    "years beyond xarray's dates": (
+        {"years": 240, "output": "xarray"},
+        r'output "xarray": years in \[1678, 2261\] are allowed, got 2025 to 2264; "daily" has all',
+    ),
     "years of float": ({"years": 2.0}, r"years: a positive integer is allowed, got 2.0"),
     "seed -1": ({"seed": -1}, r"seed.*-1"),
     "seed of float": ({"seed": 1.5}, r"seed.*1.5"),

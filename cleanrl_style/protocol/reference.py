@@ -39,7 +39,7 @@ PLANS = (NOTHING, *(str(action) for action in range(25) if not 10 <= action < 15
 FOLDER = "reference"
 FLOAT_FORMAT = "%.6g"
 # Of the simulator, what reads, draws, sends or plays, and makes no number of a year.
-NO_PHYSICS = ("executor.py", "io", "task/fronts.py", "task/grid.py", "task/many.py", "task/picture.py")
+NO_PHYSICS = ("executor.py", "io", "region", "task/fronts.py", "task/picture.py")
 #: Sources that were compared with an earlier one and make its numbers to the bit: analysis/same_physics.py.
 SAME_PHYSICS = Path(str(files("cleanrl_style.protocol"))) / "same_physics.csv"
 # A string of Python, or a comment. It goes through all source in 10 ms; the tokenizer took 200 ms of every start.

@@ -13,6 +13,7 @@ DAY = 1440  # minutes
 MOST_MINUTES = 120
 _FORMATS = {8: "%Y%m%d", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
 _DAY_END = re.compile(r"(^\d{8}|[ T])24(:?00(?::?00)?)$")  # 24:00
+_DAY_FIRST = re.compile(r"\d{1,2}[./]\d{1,2}[./]\d{4}")
 _WITH_ZONE = re.compile(r":\d\d(?:\.\d+)?\s?(?:Z|[+-]\d\d(?::?\d\d)?)$")
 
 
@@ -37,11 +38,15 @@ def read_times(table: Table, texts: pd.Series, name: str) -> pd.DatetimeIndex:
     wrong = times.isna().to_numpy()
     if wrong.any():
         row = int(np.argmax(wrong))
-        no_digit = not any(letter.isdigit() for letter in str(texts.iloc[row]))
-        hint = "; rows of units below the names have to be removed" if row == 0 and no_digit else ""
+        value = texts.iloc[row]
+        value = value.item() if isinstance(value, np.generic) else value
+        hint = ""
+        if row == 0 and not any(letter.isdigit() for letter in str(value)):
+            hint = "; rows of units below the names have to be removed"
+        elif _DAY_FIRST.match(str(value)):
+            hint = "; of days first: read it by pandas, its times by pd.to_datetime(.., dayfirst=True)"
         raise ValueError(
-            f"{table.where(row)}: {name} is {texts.iloc[row]!r}; a time as 201906031230 or 2019-06-03 12:30 is "
-            f"allowed{hint}"
+            f"{table.where(row)}: {name} is {value!r}; a time as 201906031230 or 2019-06-03 12:30 is allowed{hint}"
         )
     return pd.DatetimeIndex(times)
 
@@ -69,6 +74,8 @@ def interval_of(table: Table, times: pd.DatetimeIndex) -> int:
         if first < row:
             autumn = times[row].month in (9, 10, 11) and minutes[row - 1] > -60.0
             hint = "; a clock of summer time has an hour twice: standard time all year is allowed" if autumn else ""
+            if (times == times.normalize()).all():
+                hint = "; if the time of day is in a column of its own, join the two"
             raise ValueError(
                 f"{table.where(row)}: {_text(times[row])} is there twice, first in {table.where(first)}{hint}"
             )

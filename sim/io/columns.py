@@ -194,12 +194,14 @@ def choose(record: str, table: list[str], columns: dict | None, units: dict | No
         if name not in table:
             raise ValueError(f"units: the record has no column {name!r}{_near(name, table)}")
 
-    found: dict[str, Column] = {}
     empties: dict[str, list[str]] = {}
+    picked: dict[str, str] = {}
     for quantity, names in NAMES.items():
         name, empties[quantity] = _pick(record, quantity, names, table, columns, empty)
         if name:
-            found[quantity] = _column(record, quantity, name, names, table, units)
+            picked[quantity] = name
+    _check_units(record, picked, units)
+    found = {quantity: _column(quantity, name, table, units) for quantity, name in picked.items()}
     by_parts = "eastward_wind" in found and "northward_wind" in found
     for quantity in NEEDED:
         if quantity not in found and not (quantity == "wind_speed" and by_parts):
@@ -254,16 +256,35 @@ def _at_positions(record: str, name: str, table: list[str]) -> list[str]:
     return best[:1]
 
 
-def _column(record, quantity, name, names, table, units) -> Column:
+def _unit(quantity: str, name: str, units: dict) -> str | None:
+    """The unit of a column, as it is given or known by the column's name."""
+    names = NAMES[quantity]
     base = name if name in names else next((n for n in names if _POSITION.fullmatch(name.removeprefix(n))), None)
-    unit = units.get(name, names.get(base) if base else None)
-    kinds = ("deficit", "relative_humidity", "dew_point") if quantity == "humidity" else (quantity,)
-    allowed = [u for kind in kinds for u in _UNITS[kind]]
-    if unit is None:
-        raise ValueError(f"{record}: the unit of {name} is not known; say units={{{name!r}: ..}}: {', '.join(allowed)}")
-    kind = next((kind for kind in kinds if unit in _UNITS[kind]), None)
-    if kind is None:
-        raise ValueError(f"units: {name} in {unit!r}; allowed for {quantity}: {', '.join(allowed)}")
+    return units.get(name, names.get(base) if base else None)
+
+
+def _kinds(quantity: str) -> tuple[str, ...]:
+    return ("deficit", "relative_humidity", "dew_point") if quantity == "humidity" else (quantity,)
+
+
+def _check_units(record: str, picked: dict[str, str], units: dict) -> None:
+    """Refuse columns whose unit is not known, all at once, or not one of their quantity."""
+    allowed = {quantity: ", ".join(u for kind in _kinds(quantity) for u in _UNITS[kind]) for quantity in picked}
+    unknown = [quantity for quantity, name in picked.items() if _unit(quantity, name, units) is None]
+    if unknown:
+        names = [picked[quantity] for quantity in unknown]
+        say = ", ".join(f"{name!r}: .." for name in names)
+        each = "; ".join(f"{name} in {allowed[quantity]}" for name, quantity in zip(names, unknown, strict=True))
+        raise ValueError(f"{record}: units are not known; say units={{{say}}}: {each}")
+    for quantity, name in picked.items():
+        unit = _unit(quantity, name, units)
+        if not any(unit in _UNITS[kind] for kind in _kinds(quantity)):
+            raise ValueError(f"units: {name} in {unit!r}; allowed for {quantity}: {allowed[quantity]}")
+
+
+def _column(quantity: str, name: str, table: list[str], units: dict) -> Column:
+    names, unit = NAMES[quantity], str(_unit(quantity, name, units))
+    kind = next(kind for kind in _kinds(quantity) if unit in _UNITS[kind])
     quality = f"{name}_QC" if f"{name}_QC" in table else None
     reanalysis = next((n for n in names if n.endswith("_ERA") and n in table and n != name), None)
     same = reanalysis if reanalysis and names[reanalysis] == unit else None
@@ -301,4 +322,4 @@ def _near(name, table) -> str:
 
 
 def _some(table) -> str:
-    return ", ".join(table[:12]) + (f", .. ({len(table)} columns)" if len(table) > 12 else "")
+    return (", ".join(table[:12]) or "none") + (f", .. ({len(table)} columns)" if len(table) > 12 else "")

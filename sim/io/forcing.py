@@ -11,7 +11,7 @@ from sim.io.clock import DAY, check_ends, hours_apart, interval_of, kind_of_time
 from sim.io.columns import LIMITS, NAMES, Choice, Column, choose
 from sim.io.disaggregation import FOREST_CYCLE, DiurnalCycle, climate_of, half_hours, saturation_water
 from sim.io.longwave import cloud_cover, longwave
-from sim.io.plausible import check_sun, percent, unusual_lines
+from sim.io.plausible import FEWEST_DAYS, check_sun, percent, unusual_lines
 from sim.io.table import Table, open_table
 from sim.parameters import SITE_PARAMETERS
 from sim.state import FORCING
@@ -68,7 +68,8 @@ def read_forcing(
         (29 February is dropped), or a part of one year.
     gaps : "refuse" raises at the first; "fill" fills those of up to `longest_gap_days` days and flags them: by the
         reanalysis column that the record has beside it, on a straight line over three hours, as the mean of the same
-        time of day in the weeks around (Falge et al. 2001); longwave by temperature, humidity and sunlight.
+        time of day in the weeks around (Falge et al. 2001); longwave of more than three hours, however many, by
+        temperature, humidity and sunlight.
     columns : names of your own: {"air_temperature": "Tair", "time_start": "begin", ..}. Times are "time_start",
         "time_end" or "time_middle" of their intervals, or the "time" of a reanalysis or a day.
     units : of columns whose unit is not the usual one, or not known: {"Tair": "K"}.
@@ -142,7 +143,7 @@ def read_forcing(
             raise ValueError(f"{line}; unusual='take' takes it as it is")
         taken.append(line)
     report += [f"unusual, and taken as it is: {line}" for line in taken]
-    _repeat_at_edges(record, flags, row_of, interval, report)
+    _repeat_at_edges(record, flags, row_of, interval)
     _fill(table, record, flags, row_of, choice, interval, gaps, longest_gap_days)
     _add_longwave(record, flags, choice, latitude_deg)
     site = {"latitude_deg": float(latitude_deg), **climate_of(record["air_temperature"])}
@@ -157,7 +158,9 @@ def read_forcing(
         forcing, flags = record[list(OURS)].rename(columns=OURS)[kept], flags[list(OURS)][kept]
     forcing = forcing.rename_axis("time").join(flags.rename(columns={q: f"{name}_flag" for q, name in OURS.items()}))
     dropped = int(_leap_day(wanted).sum() * interval // DAY)
-    report += [f"29 February was dropped {dropped} times"] if dropped else []
+    report += [f"29 February was dropped in {dropped} year{'s' * (dropped > 1)}"] if dropped else []
+    if (days := len(wanted) * interval // DAY) < FEWEST_DAYS:
+        report.append(f"{days} days are too few to tell wrong units by: it takes {FEWEST_DAYS}, for rain a year")
     pressure = choice.columns.get("air_pressure")
     if pressure:
         report.append(
@@ -229,6 +232,9 @@ def _recognised(names: list[str], columns: dict | None, units: dict | None) -> l
     for what, mapping in (("columns", columns), ("units", units)):
         if mapping is not None and not isinstance(mapping, dict):
             raise ValueError(f"{what}: a dict of names is allowed, got {type(mapping).__name__}")
+        for key, name in (mapping or {}).items():
+            if not isinstance(name, str):
+                raise ValueError(f"{what}: a text for {key!r} is allowed, got {name!r}")
     known = {name for quantity in NAMES.values() for name in quantity}
     wanted = {*(columns or {}).values(), "TIMESTAMP_START", "TIMESTAMP_END", "TIMESTAMP"}
     wanted |= {"valid_time", "time", "date", "Date", "datetime"}
@@ -360,7 +366,11 @@ def _whole_days(table: Table, index: pd.DatetimeIndex, interval: int, years) -> 
     else:
         start = begins((first + edge).year)
         if abs(first - start) > edge:
-            say = f"; say years=({whole[0]}, {whole[-1]})" if whole else ""
+            say = (
+                f"; say years=({whole[0]}, {whole[-1]})"
+                if whole
+                else ", if need be with a reanalysis before it (dates of solar time)"
+            )
             raise ValueError(f"{table.name}: {have}; it has to start on 1 January{say}")
         days = math.floor((end + edge - start) / pd.Timedelta(days=1))
         stop = start + pd.Timedelta(days=days)
@@ -371,7 +381,7 @@ def _whole_days(table: Table, index: pd.DatetimeIndex, interval: int, years) -> 
     return pd.date_range(start, stop - step, freq=f"{interval}min")
 
 
-def _repeat_at_edges(record, flags, row_of, interval: int, report: list[str]) -> None:
+def _repeat_at_edges(record, flags, row_of, interval: int) -> None:
     """Fill what solar time leaves of the first and the last day from the day beside it, in place."""
     there, per_day = np.flatnonzero(row_of.notna()), DAY // interval
     if not len(there) or interval == DAY:
@@ -384,13 +394,10 @@ def _repeat_at_edges(record, flags, row_of, interval: int, report: list[str]) ->
             record.iloc[place] = record.iloc[place + away].to_numpy()
             flags.iloc[place] = REPEATED
             row_of.iloc[place] = row_of.iloc[place + away].to_numpy()
-            report.append(
-                f"{len(place)} intervals at the record's {'start' if away > 0 else 'end'} repeat the day beside them"
-            )
 
 
 def _fill(table, record, flags, row_of, choice: Choice, interval: int, gaps: str, longest_gap_days: float) -> None:
-    """Refuse gaps or fill them, in place; longwave is left to `_add_longwave`."""
+    """Refuse gaps or fill them, in place; longwave of more than three hours is left to `_add_longwave`."""
     per_day = DAY // interval
     kept = ~_leap_day(record.index)  # a record may lack the day that is dropped anyway
     for quantity in OURS:
@@ -402,6 +409,7 @@ def _fill(table, record, flags, row_of, choice: Choice, interval: int, gaps: str
         if f"{quantity}_beside" in record:
             _put(record, flags, quantity, record[f"{quantity}_beside"], BY_REANALYSIS)
         if quantity == "longwave":
+            _put(record, flags, quantity, filling.interpolated(record[quantity], interval), BY_LINE)
             continue
         left = record[quantity].isna().to_numpy() & kept
         first, length = filling.longest(left)

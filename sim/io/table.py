@@ -117,9 +117,14 @@ def _csv(path: Path) -> Table:
         raise ValueError(f"forcing: {path.name}, line {comments + 1}: a row of column names is needed, got nothing")
     separator = max(",;\t", key=header.count)
     columns = [name.strip().strip('"') for name in header.rstrip("\r\n").split(separator)]
+    at = f"forcing: {path.name}, line {comments + 1}"
+    if all(re.fullmatch(r"[-+.\d][-+.:\d eTZ]*", name) for name in columns):
+        raise ValueError(f"{at}: a row of column names is needed, got numbers, {', '.join(columns[:3])}")
+    if len(columns) == 1 and len(columns[0].split()) > 1:
+        raise ValueError(f"{at}: columns separated by comma, semicolon or tab are allowed, got {header.strip()!r}")
     twice = [name for k, name in enumerate(columns) if name in columns[:k]]
     if twice:
-        raise ValueError(f"forcing: {path.name}, line {comments + 1}: column {twice[0]} is there twice")
+        raise ValueError(f"{at}: column {twice[0]} is there twice")
 
     _check_fields(path, separator, len(columns), comments)
 

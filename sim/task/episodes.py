@@ -83,7 +83,10 @@ class Episodes:
             if not isinstance(value, (bool, np.bool_)):
                 raise ValueError(f"{name}: True or False is allowed, got {value!r}")
         self.number, self.mode, self.years = number, mode, int(years)
-        self.thaw_formulation = thaw_formulation
+        self.record_years, self.record_steps = bool(record_years), bool(record_steps)
+        self.thaw_formulation, self.harvest_min_class = thaw_formulation, harvest_min_class
+        self.reward = Reward.of(reward, bool(balanced))
+
         sim.middle_site(parameter_overrides)
         self.site_seed, self.parameter_overrides = site_seed, dict(parameter_overrides or {})
         self.initial_ranges = check_initial_ranges(initial_ranges)
@@ -93,28 +96,12 @@ class Episodes:
         ):
             if ours == "balanced" and name in given:
                 raise ValueError(f"{name}: {how}='balanced' finds it; a value of your own is not allowed")
-        self.harvest_min_class = harvest_min_class
-        self.reward = Reward.of(reward, bool(balanced))
+
         objectives = check_objectives(objectives)
-        self.objective_names = tuple(objective_names(objectives))
         self.fixed_weights = None
         if fixed_preference is not None:
             self.fixed_weights = check_weights(fixed_preference, len(objectives), "fixed_preference")
-        self.own_objectives = [objective for objective in objectives if isinstance(objective, Objective)]
-        if timber is None and TIMBER in objectives:
-            raise ValueError(f"objective 'timber' needs prices: timber=, such as {', '.join(countries())}")
-        if timber is None and discount_rate is not None:
-            raise ValueError(f"discount_rate = {discount_rate!r}: it needs prices, timber=, such as {countries()[0]}")
-        self.timber = None if timber is None else Timber(timber, discount_rate)
-        self.history_names = (
-            *HISTORY_NAMES,
-            *(TIMBER_COLUMNS if self.timber else ()),
-            *(f"{objective.name}_{what}" for objective in self.own_objectives for what in ("clipped", "reward")),
-        )
-        self.reward_columns = [self.history_names.index(f"{name}_reward") for name in self.objective_names]
-        limits = [(o.low, o.high) if isinstance(o, Objective) else (-1.0, 1.0) for o in objectives]
-        self.reward_space = Box(*np.array(limits, dtype=np.float32).T, dtype=np.float32)
-        self.record_years, self.record_steps = bool(record_years), bool(record_steps)
+        self._name_columns(objectives, timber, discount_rate)
         self.stands = sim.Stands(
             number,
             time_step_minutes=time_step_minutes,
@@ -131,28 +118,52 @@ class Episodes:
         )
         if self.stands.scenario is not None:
             self.stands.scenario.check_years(self.years)
-        self.table = Table(observation_rows(self.objective_names))
-        self.masks = MaskFunction(self.table.names, harvest_min_class)
-        rows = self.table.rows
-        groups = check_groups(observation_groups, [row.group for row in rows])
-        if mode == "site-specific":
-            groups = tuple(group for group in groups if group != "site")
-        self.entries = [i for i, row in enumerate(rows) if row.group in groups]
-        if not self.entries:
-            raise ValueError(f"observation_groups = {observation_groups!r}: nothing is left to observe in mode {mode}")
-        kept = Table([rows[i] for i in self.entries])
-        self.observation_names = kept.names
-        self.mask_function = mask_function(kept.names, harvest_min_class)
-        most = {row.name: row.high for row in rows}
-        self.observation_space = kept.space(self.reward.largest_penalties(most["biomass"], most["soil"]))
+        self._choose_observation(observation_groups)
+
         self.weights = np.zeros((number, len(objectives)))
         self.site_seeds = np.zeros(number, dtype=np.int64)
         self.episode_seeds = np.zeros(number, dtype=np.int64)
         self.year = np.zeros(number, dtype=int)
         self.running = np.zeros(number, dtype=bool)
         self.history = np.zeros((number, self.years, len(self.history_names)))
-        self.observed = np.zeros((number, len(rows)))  # values of all rows, in their units
+        self.observed = np.zeros((number, len(self.table.rows)))  # values of all rows, in their units
         self.last_year = np.zeros((number, len(self.history_names)))
+
+    def _name_columns(self, objectives, timber, discount_rate) -> None:
+        """Columns of a year's record, and which of them are the reward."""
+        if timber is None and TIMBER in objectives:
+            raise ValueError(f"objective 'timber' needs prices: timber=, such as {', '.join(countries())}")
+        if timber is None and discount_rate is not None:
+            raise ValueError(f"discount_rate = {discount_rate!r}: it needs prices, timber=, such as {countries()[0]}")
+        self.timber = None if timber is None else Timber(timber, discount_rate)
+        self.objective_names = tuple(objective_names(objectives))
+        self.own_objectives = [objective for objective in objectives if isinstance(objective, Objective)]
+        self.history_names = (
+            *HISTORY_NAMES,
+            *(TIMBER_COLUMNS if self.timber else ()),
+            *(f"{objective.name}_{what}" for objective in self.own_objectives for what in ("clipped", "reward")),
+        )
+        self.reward_columns = [self.history_names.index(f"{name}_reward") for name in self.objective_names]
+        limits = [(o.low, o.high) if isinstance(o, Objective) else (-1.0, 1.0) for o in objectives]
+        self.reward_space = Box(*np.array(limits, dtype=np.float32).T, dtype=np.float32)
+
+    def _choose_observation(self, observation_groups) -> None:
+        """All that can be observed (masks need it), and the entries of it that are."""
+        self.table = Table(observation_rows(self.objective_names))
+        self.masks = MaskFunction(self.table.names, self.harvest_min_class)
+        rows = self.table.rows
+        groups = check_groups(observation_groups, [row.group for row in rows])
+        if self.mode == "site-specific":
+            groups = tuple(group for group in groups if group != "site")
+        self.entries = [i for i, row in enumerate(rows) if row.group in groups]
+        if not self.entries:
+            left = f"nothing is left to observe in mode {self.mode}"
+            raise ValueError(f"observation_groups = {observation_groups!r}: {left}")
+        kept = Table([rows[i] for i in self.entries])
+        self.observation_names = kept.names
+        self.mask_function = mask_function(kept.names, self.harvest_min_class)
+        most = {row.name: row.high for row in rows}
+        self.observation_space = kept.space(self.reward.largest_penalties(most["biomass"], most["soil"]))
 
     def draw(self, generator: np.random.Generator) -> tuple[int, int, np.ndarray]:
         """Site seed, episode seed and preference of an episode: always as many draws."""
@@ -190,7 +201,7 @@ class Episodes:
         """A year for all episodes; returns float32 rewards (number, objectives)."""
         if not self.running.all():
             stopped = int(np.argmin(self.running))
-            raise RuntimeError(f"step on episode {stopped} that is not running: call reset first")
+            raise RuntimeError(f"step of environment {stopped}, whose episode is over or not begun: call reset first")
         actions = check_actions(actions, self.number)
         record = self.stands.step(actions)
         parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sim.task.many import COLUMNS, LATITUDE, LONGITUDE, SEED
+from sim.region.site_table import COLUMNS, LATITUDE, LONGITUDE, SEED
 
 AXES = {LATITUDE: (LATITUDE, "latitude", "lat"), LONGITUDE: (LONGITUDE, "longitude", "lon")}  # names that files use
 MONTHLY = "air_temperature_c"  # of twelve months, from which mean and seasonal amplitude of a site follow

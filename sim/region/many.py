@@ -4,20 +4,12 @@ The table is played in chunks, each as `Episodes` of the environment, so that a 
 it gives alone. A chunk is written when it is finished: what is killed goes on there, to the same bytes.
 """
 
-import difflib
-import hashlib
 import inspect
-import json
 import math
-import os
-import re
-import shutil
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -28,18 +20,15 @@ import sim
 from sim.block import compiling, is_compiled, lanes_for
 from sim.executor import HERE, each
 from sim.management import NUM_ACTIONS, as_array, check_actions
-from sim.parameters import check_name, check_seed
-from sim.spin_up import BOUNDARY, CLASS_NAMES, INITIAL_LIMITS, LARGEST_STEM_KGC, check_initial
+from sim.parameters import check_name
+from sim.region.plan import Plan
+from sim.region.site_table import SEED, check_sites
+from sim.region.store import Store, digest
+from sim.spin_up import BOUNDARY, INITIAL_LIMITS
 from sim.stands import check_threads
-from sim.state import RECORD
 from sim.task.actions import NO_CHANGE
 from sim.task.episodes import ARGUMENTS, DEFAULT_YEARS, Episodes
 from sim.task.preference import check_weights
-
-try:
-    import fcntl
-except ImportError:  # Windows, where a store is not locked
-    fcntl = None  # type: ignore[assignment]
 
 #: What is kept of the annual record, where nothing else is asked for.
 VARIABLES = (
@@ -57,8 +46,6 @@ VARIABLES = (
     "peak_snow_depth_m",
     "fire_mortality",
 )
-OTHERS = ("middle", "sampled")
-
 #: Arguments of an environment that a table of sites leaves no room for.
 NOT_OF_MANY = ("mode", "years", "site_seed", "fixed_preference", "parameter_overrides", "record_years")
 
@@ -68,16 +55,6 @@ WORLD = ("weather", "boundary", "soil_carbon", "scenario")
 PROBES = 256
 CHUNK_STAND_YEARS, LARGEST_CHUNK = 51_200, 4096  # a chunk: half a minute on two cores, and 0.2 GB
 TELL_SECONDS = 10.0
-
-LATITUDE, LONGITUDE, SEED = "latitude_deg", "longitude_deg", "seed"
-DENSITY, BIOMASS = "density_stems_ha", "biomass_kgc_m2"
-#: Columns that a table of sites may have: name -> (low, high, unit).
-COLUMNS = {
-    **{name: (p.physical_low, p.physical_high, p.unit) for name, p in sim.SITE_PARAMETERS.items()},
-    **{name: (low, high, "") for name, (low, high) in INITIAL_LIMITS.items()},
-    LONGITUDE: (-180.0, 360.0, "degE"),
-    SEED: (0, 2**63 - 1, ""),
-}
 
 
 def simulate_many(
@@ -167,35 +144,6 @@ def simulate_many(
 # ---------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Plan:
-    """A checked simulation, or a chunk of one."""
-
-    table: pd.DataFrame
-    actions: Any  # a policy, or integers (sites, years)
-    years: int
-    weights: np.ndarray
-    others: str
-    variables: tuple[str, ...]
-    arguments: dict
-    size: int  # sites of a chunk
-    threads: int
-
-    @property
-    def chunks(self) -> int:
-        """How many there are."""
-        return math.ceil(len(self.table) / self.size)
-
-    def rows(self, k: int) -> slice:
-        """Sites of chunk k."""
-        return slice(k * self.size, min((k + 1) * self.size, len(self.table)))
-
-    def part(self, k: int) -> "Plan":
-        """Chunk k alone."""
-        actions = self.actions if callable(self.actions) else self.actions[self.rows(k)]
-        return Plan(**{**vars(self), "table": self.table.iloc[self.rows(k)], "actions": actions})
-
-
 def play(part: Plan) -> dict[str, np.ndarray]:
     """A chunk from its first to its last year: `action`, int8, and the variables, float32, (sites, years) each."""
     number = len(part.table)
@@ -276,84 +224,8 @@ def chunk_size(sites: int, years: int) -> int:
 
 
 # ---------------------------------------------------------------------------------------------------------------
-# What is checked
+# What is checked, beside the sites
 # ---------------------------------------------------------------------------------------------------------------
-
-
-def check_sites(sites, others: str, seed: int) -> pd.DataFrame:
-    """A table of sites with a column `seed`; ValueError names row, column, value and what is allowed."""
-    check_name("others", others, OTHERS)
-    if not isinstance(sites, pd.DataFrame):
-        raise ValueError(
-            f"sites: a DataFrame with a row a site is allowed, got {type(sites).__name__}; sim.sites_on_grid makes one"
-        )
-    if not len(sites):
-        raise ValueError("sites: the table has no row; at least one site is needed")
-    for name in sites.columns:
-        if name not in COLUMNS:
-            begun = [column for column in COLUMNS if column.startswith(str(name).lower())]
-            near = begun[:3] or difflib.get_close_matches(str(name).lower(), COLUMNS, n=3)
-            raise ValueError(
-                f"sites: unknown column {name!r}; "
-                + (f"did you mean {', '.join(near)}? " if near else "")
-                + "allowed are names of sim/site_parameters.csv, first stocks (initial= of sim.simulate), "
-                f"{LONGITUDE} and {SEED}"
-            )
-    if not sites.columns.is_unique:
-        raise ValueError(f"sites: column {sites.columns[sites.columns.duplicated()][0]!r} is there twice")
-    if LATITUDE not in sites:
-        raise ValueError(f"sites: column {LATITUDE} is missing; every site needs its latitude")
-    table = pd.DataFrame({name: check_column(sites[name], *COLUMNS[name]) for name in sites.columns})
-    check_initial({name: table[name].iloc[0] for name in table if name in INITIAL_LIMITS and name != BIOMASS})
-    check_biomass(table, sites.index)
-    if SEED not in table:
-        last = check_seed("seed", seed) + len(table) - 1
-        if last >= 2**63:
-            raise ValueError(f"seed = {seed}: row k gets seed + k, so at most 2^63 - {len(table)} is allowed")
-        table[SEED] = np.arange(seed, last + 1)
-    return table.reset_index(drop=True)
-
-
-def row_of(index: pd.Index, k: int) -> str:
-    """Row k, as an error names it."""
-    return f"zero-based row {k}" if index.equals(pd.RangeIndex(len(index))) else f"row {index[k]}"
-
-
-def check_biomass(table: pd.DataFrame, index: pd.Index) -> None:
-    """Refuse first biomass of no stems, or of more than `LARGEST_STEM_KGC` a stem."""
-    by_class = [name for name in CLASS_NAMES if name in table]
-    if BIOMASS not in table or not (by_class or DENSITY in table):
-        return
-    stems = table[by_class].sum(axis=1) if by_class else table[DENSITY]
-    most = stems * LARGEST_STEM_KGC * 1e-4
-    wrong = (table[BIOMASS] > most).to_numpy()
-    if wrong.any():
-        k = int(wrong.argmax())
-        raise ValueError(
-            f"sites: {row_of(index, k)}, column {BIOMASS} is {table[BIOMASS].iloc[k]:g}; of {stems.iloc[k]:g} stems/ha "
-            f"at most {most.iloc[k]:.4g} kgC/m2 is allowed, {LARGEST_STEM_KGC:g} kgC a stem"
-        )
-
-
-def check_column(column: pd.Series, low: float, high: float, unit: str) -> np.ndarray:
-    """The numbers of a column, all within its limits."""
-    whole = column.name == SEED
-    numbers = pd.to_numeric(column, errors="coerce")
-    values = numbers.to_numpy(float, na_value=np.nan)
-    wrong = ~((values >= low) & (values <= high))
-    if whole:
-        wrong |= values % 1 != 0
-    if column.dtype.kind in "bc":  # truth values, complex numbers
-        wrong[:] = True
-    if wrong.any():
-        k = int(wrong.argmax())
-        value = "missing" if pd.isna(column.iloc[k]) else f"{column.iloc[k]}"
-        kind = "an integer" if whole else "a number"
-        raise ValueError(
-            f"sites: {row_of(column.index, k)}, column {column.name} is {value}; "
-            f"{kind} in [{low:g}, {high:g}]{f' {unit}' if unit not in ('', '1') else ''} is allowed"
-        )
-    return numbers.to_numpy(np.int64) if whole else values
 
 
 def check_world(years: int, threads: int | None, arguments: dict, table: pd.DataFrame) -> Episodes:
@@ -424,187 +296,3 @@ def check_variables(variables, names) -> tuple[str, ...]:
     for name in variables:
         check_name("variable", name, names)
     return tuple(dict.fromkeys(variables))
-
-
-def digest(*arrays: np.ndarray) -> str:
-    """Hash of arrays."""
-    found = hashlib.sha256()
-    for values in arrays:
-        found.update(repr(values.shape).encode() + np.ascontiguousarray(values).tobytes())
-    return found.hexdigest()[:16]
-
-
-def without_addresses(value) -> str:
-    """What an argument is, in words that are the same in every process."""
-    return re.sub(r" at 0x[0-9a-f]+", "", repr(value))
-
-
-def simulator() -> str:
-    """Hash of the simulator's source and tables."""
-    found, folder = hashlib.sha256(), Path(sim.__file__).parent
-    for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.csv")]):
-        found.update(path.read_bytes())
-    return found.hexdigest()[:16]
-
-
-# ---------------------------------------------------------------------------------------------------------------
-# Where it goes
-# ---------------------------------------------------------------------------------------------------------------
-
-
-class Store:
-    """A zarr store that is written chunk by chunk, and is there under its name when all are.
-
-    Meanwhile `<path>.partial` has it, and a file for each chunk that is written. A context: it holds a lock meanwhile.
-    """
-
-    def __init__(self, path, plan: Plan, label: str, overwrite: bool):
-        if path is not None and not (isinstance(path, (str, os.PathLike)) and Path(path).name):
-            raise ValueError(f"path {path!r}: the name of a folder is allowed")
-        if path is not None and Path(path).suffix in (".nc", ".csv"):
-            raise ValueError(
-                f"path {path}: a zarr store is written, such as region.zarr; `.to_netcdf` makes NetCDF of it"
-            )
-        self.plan = plan
-        self.settings = {
-            "simulator": simulator(),
-            "sites": digest(*(plan.table[name].to_numpy() for name in plan.table)) + f", {len(plan.table)}",
-            "columns": list(plan.table),
-            "actions": label,
-            "years": plan.years,
-            "others": plan.others,
-            "preference": plan.weights.tolist(),
-            "variables": list(plan.variables),
-            "arguments": {name: without_addresses(value) for name, value in sorted(plan.arguments.items())},
-        }
-        self.path: Any = None if path is None else Path(path)
-        self.partial: Any = None if path is None else Path(path).with_name(Path(path).name + ".partial")
-        self.overwrite = overwrite
-        self.group: Any = None
-        self.lock: Any = None
-        self.waiting = list(range(plan.chunks))
-
-    def __enter__(self) -> "Store":
-        import zarr
-
-        if self.path is None:
-            self.group = self._create(zarr.storage.MemoryStore())
-            return self
-        data, written = self.partial / "data.zarr", self.partial / "written"
-        if self.path.exists():
-            there = settings_of(self.path)
-            if not self.overwrite:
-                self._compare(there)
-                self.waiting = []
-                if not data.exists():  # killed after its last act but one
-                    shutil.rmtree(self.partial, ignore_errors=True)
-                return self
-        try:
-            self.partial.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ValueError(f"path {self.path}: cannot write there ({error.strerror})") from error
-        self.lock = locked(self.partial / "lock", self.path)
-        try:
-            if self.overwrite:
-                for old in (written, self.path):
-                    shutil.rmtree(old, ignore_errors=True)
-            if written.exists():
-                self._compare(settings_of(data))
-                self.waiting = [k for k in self.waiting if not (written / str(k)).exists()]
-                self.group = zarr.open_group(data, mode="r+")
-            else:  # killed before it was whole, or new
-                shutil.rmtree(data, ignore_errors=True)
-                self.group = self._create(data)
-                written.mkdir()
-        except BaseException:
-            self.lock.close()
-            raise
-        return self
-
-    def __exit__(self, kind, error, trace) -> None:
-        if self.lock is not None:
-            if self.path.exists():
-                shutil.rmtree(self.partial)
-            self.lock.close()
-
-    def _compare(self, there: dict) -> None:
-        """Refuse to go on with another simulation."""
-        for name, value in json.loads(json.dumps(self.settings)).items():
-            if there.get(name) != value:
-                raise ValueError(
-                    f"{self.path} holds another simulation: {name} {there.get(name)} there, {value} now "
-                    "(overwrite=True starts over)"
-                )
-
-    def _create(self, store):
-        """An empty store with its coordinates."""
-        import zarr
-
-        plan, number = self.plan, len(self.plan.table)
-        attributes = {
-            "title": "Stands of the BoreaRL simulator, one a site",
-            "settings": json.dumps(self.settings),
-            "coordinates": " ".join(map(coordinate, plan.table)),
-        }
-        group = zarr.create_group(store, zarr_format=3, attributes=attributes)
-        for name in plan.table:
-            values = plan.table[name].to_numpy()
-            units = {"units": COLUMNS[name][2]} if COLUMNS[name][2] else {}
-            group.create_array(
-                coordinate(name), data=values, chunks=(number,), dimension_names=("stand",), attributes=units
-            )
-        group.create_array("year", data=np.arange(plan.years), chunks=(plan.years,), dimension_names=("year",))
-        for name in (*plan.variables, "action"):
-            unit, meaning = RECORD.get(name, ("1", name.replace("_", " ")))
-            group.create_array(
-                name,
-                shape=(number, plan.years),
-                chunks=(plan.size, plan.years),
-                dtype="int8" if name == "action" else "float32",
-                dimension_names=("stand", "year"),
-                attributes={"units": unit, "long_name": meaning},
-            )
-        return group
-
-    def write(self, k: int, played: dict[str, np.ndarray]) -> None:
-        """Write chunk k, and then that it is written."""
-        for name, values in played.items():
-            self.group[name][self.plan.rows(k)] = values
-        if self.path is not None:
-            (self.partial / "written" / str(k)).touch()
-
-    def dataset(self):
-        """The finished store."""
-        import xarray
-
-        if self.path is not None and not self.path.exists():
-            os.replace(self.partial / "data.zarr", self.path)
-        store = self.group.store if self.path is None else self.path
-        return xarray.open_zarr(store, consolidated=False, chunks=None, decode_timedelta=False)
-
-
-def settings_of(folder: Path) -> dict:
-    """What a store was made by; ValueError if it is none of ours."""
-    import zarr
-
-    try:
-        return json.loads(zarr.open_group(folder, mode="r").attrs["settings"])
-    except (OSError, KeyError, ValueError) as error:
-        raise ValueError(f"{folder}: no store of simulate_many; name another path") from error
-
-
-def locked(path: Path, store: Path):
-    """A file that no other process holds; ValueError if one does."""
-    file = open(path, "w")
-    if fcntl is not None:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            file.close()
-            raise ValueError(f"{store}: another process is at work on it") from None
-    return file
-
-
-def coordinate(column: str) -> str:
-    """What the store calls a column of the table: first stocks are not taken for those of the years."""
-    return f"initial_{column}" if column in INITIAL_LIMITS else column

@@ -1,0 +1,1 @@
+"""Many sites at once: the table of a region's sites, their simulation on all cores or a cluster, and its store."""

@@ -1,0 +1,97 @@
+"""The table of sites of a region: its columns, and what is refused in them."""
+
+import difflib
+
+import numpy as np
+import pandas as pd
+
+import sim
+from sim.parameters import check_name, check_seed
+from sim.spin_up import CLASS_NAMES, INITIAL_LIMITS, LARGEST_STEM_KGC, check_initial
+
+OTHERS = ("middle", "sampled")
+LATITUDE, LONGITUDE, SEED = "latitude_deg", "longitude_deg", "seed"
+DENSITY, BIOMASS = "density_stems_ha", "biomass_kgc_m2"
+#: Columns that a table of sites may have: name -> (low, high, unit).
+COLUMNS = {
+    **{name: (p.physical_low, p.physical_high, p.unit) for name, p in sim.SITE_PARAMETERS.items()},
+    **{name: (low, high, "") for name, (low, high) in INITIAL_LIMITS.items()},
+    LONGITUDE: (-180.0, 360.0, "degE"),
+    SEED: (0, 2**63 - 1, ""),
+}
+
+
+def check_sites(sites, others: str, seed: int) -> pd.DataFrame:
+    """A table of sites with a column `seed`; ValueError names row, column, value and what is allowed."""
+    check_name("others", others, OTHERS)
+    if not isinstance(sites, pd.DataFrame):
+        raise ValueError(
+            f"sites: a DataFrame with a row a site is allowed, got {type(sites).__name__}; sim.sites_on_grid makes one"
+        )
+    if not len(sites):
+        raise ValueError("sites: the table has no row; at least one site is needed")
+    for name in sites.columns:
+        if name not in COLUMNS:
+            begun = [column for column in COLUMNS if column.startswith(str(name).lower())]
+            near = begun[:3] or difflib.get_close_matches(str(name).lower(), COLUMNS, n=3)
+            raise ValueError(
+                f"sites: unknown column {name!r}; "
+                + (f"did you mean {', '.join(near)}? " if near else "")
+                + "allowed are names of sim/site_parameters.csv, first stocks (initial= of sim.simulate), "
+                f"{LONGITUDE} and {SEED}"
+            )
+    if not sites.columns.is_unique:
+        raise ValueError(f"sites: column {sites.columns[sites.columns.duplicated()][0]!r} is there twice")
+    if LATITUDE not in sites:
+        raise ValueError(f"sites: column {LATITUDE} is missing; every site needs its latitude")
+    table = pd.DataFrame({name: check_column(sites[name], *COLUMNS[name]) for name in sites.columns})
+    check_initial({name: table[name].iloc[0] for name in table if name in INITIAL_LIMITS and name != BIOMASS})
+    check_biomass(table, sites.index)
+    if SEED not in table:
+        last = check_seed("seed", seed) + len(table) - 1
+        if last >= 2**63:
+            raise ValueError(f"seed = {seed}: row k gets seed + k, so at most 2^63 - {len(table)} is allowed")
+        table[SEED] = np.arange(seed, last + 1)
+    return table.reset_index(drop=True)
+
+
+def row_of(index: pd.Index, k: int) -> str:
+    """Row k, as an error names it."""
+    return f"zero-based row {k}" if index.equals(pd.RangeIndex(len(index))) else f"row {index[k]}"
+
+
+def check_biomass(table: pd.DataFrame, index: pd.Index) -> None:
+    """Refuse first biomass of no stems, or of more than `LARGEST_STEM_KGC` a stem."""
+    by_class = [name for name in CLASS_NAMES if name in table]
+    if BIOMASS not in table or not (by_class or DENSITY in table):
+        return
+    stems = table[by_class].sum(axis=1) if by_class else table[DENSITY]
+    most = stems * LARGEST_STEM_KGC * 1e-4
+    wrong = (table[BIOMASS] > most).to_numpy()
+    if wrong.any():
+        k = int(wrong.argmax())
+        raise ValueError(
+            f"sites: {row_of(index, k)}, column {BIOMASS} is {table[BIOMASS].iloc[k]:g}; of {stems.iloc[k]:g} stems/ha "
+            f"at most {most.iloc[k]:.4g} kgC/m2 is allowed, {LARGEST_STEM_KGC:g} kgC a stem"
+        )
+
+
+def check_column(column: pd.Series, low: float, high: float, unit: str) -> np.ndarray:
+    """The numbers of a column, all within its limits."""
+    whole = column.name == SEED
+    numbers = pd.to_numeric(column, errors="coerce")
+    values = numbers.to_numpy(float, na_value=np.nan)
+    wrong = ~((values >= low) & (values <= high))
+    if whole:
+        wrong |= values % 1 != 0
+    if column.dtype.kind in "bc":  # truth values, complex numbers
+        wrong[:] = True
+    if wrong.any():
+        k = int(wrong.argmax())
+        value = "missing" if pd.isna(column.iloc[k]) else f"{column.iloc[k]}"
+        kind = "an integer" if whole else "a number"
+        raise ValueError(
+            f"sites: {row_of(column.index, k)}, column {column.name} is {value}; "
+            f"{kind} in [{low:g}, {high:g}]{f' {unit}' if unit not in ('', '1') else ''} is allowed"
+        )
+    return numbers.to_numpy(np.int64) if whole else values
