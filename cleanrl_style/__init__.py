@@ -1,8 +1,8 @@
 """Training scripts that read top to bottom, and what they share.
 
-Importing it has torch calculate in one way on all processors with AVX2. Left alone, its matrix products (MKL) and its
-functions of vectors take another order of sums on AMD's processors than on Intel's, and another with AVX-512, so that
-equal trainings part in a last bit. What is set in the environment stays as it is.
+Imported before torch first calculates, it has torch do so in one way on all processors with AVX2. Left alone, its
+matrix products (MKL) and its functions of vectors take another order of sums on AMD's processors than on Intel's, and
+another with AVX-512, so that equal trainings part in a last bit. What is set in the environment stays as it is.
 """
 
 import os

@@ -221,7 +221,7 @@ class Curriculum:
     def __init__(self, task, args):
         self.coin = np.random.default_rng([args.seed, 1]) if args.selector == "coin" else None
         self.site_entries = list(task.site_entries)  # of the observation
-        sees_sites = args.site_seed is None and len(self.site_entries) > 0
+        sees_sites = (task.draws_sites or not task.boreal) and len(self.site_entries) > 0
         self.accepts_all = self.coin is None and not sees_sites
         self.threshold = 0.0 if self.accepts_all else args.threshold
         # a generator of its own: the agent is the one that ppo_gated starts from
@@ -437,7 +437,7 @@ if __name__ == "__main__":
                     pg_loss, v_loss, entropy = parts[:3]
                     loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
 
-                    optimizer.zero_grad(set_to_none=False)
+                    optimizer.zero_grad(set_to_none=False)  # None would cut the network off from `parameters`
                     loss.backward()
                     nn.utils.clip_grad_norm_(parameters, args.max_grad_norm)
                     optimizer.step()

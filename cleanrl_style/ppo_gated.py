@@ -346,7 +346,7 @@ if __name__ == "__main__":
                     pg_loss, v_loss, entropy = parts[:3]
                     loss = pg_loss - args.ent_coef * entropy + args.vf_coef * v_loss
 
-                    optimizer.zero_grad(set_to_none=False)
+                    optimizer.zero_grad(set_to_none=False)  # None would cut the network off from `parameters`
                     loss.backward()
                     nn.utils.clip_grad_norm_(parameters, args.max_grad_norm)
                     optimizer.step()

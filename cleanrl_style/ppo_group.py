@@ -58,8 +58,6 @@ class Args:
     """weight of the value loss"""
     max_grad_norm: float = 0.5
     """largest norm of the gradient"""
-    scalarization: Literal["linear", "chebyshev"] = "linear"
-    """what a return is worth: the weighted sum, or minus the largest weighted shortfall from an ideal point"""
     reward_scales: tuple[float, ...] | None = None
     """factors of the rewards, before they are scalarised for training (None: 1 each)"""
 
@@ -201,7 +199,7 @@ def weigh_advantages(advantages, weights):
     objectives vary most would be all that is learnt.
     """
     variance = ((weights @ advantages.T.cov()) * weights).sum(dim=1)
-    return protocol.scalarize(advantages, weights) / (variance.sqrt() + 1e-8)
+    return protocol.scalarize(advantages, weights) / (variance.clamp(min=0).sqrt() + 1e-8)
 
 
 def spread_preferences(num_groups, group_size, num_objectives):
@@ -241,8 +239,6 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
 
 
 if __name__ == "__main__":
-    if args.scalarization == "chebyshev":
-        protocol.fail("--scalarization chebyshev: each objective has an advantage of its own here; linear is allowed")
     task = protocol.make_task(args, hide_site=args.hide_site)
     if args.num_envs == 1 and 1 in (args.rollout_steps, args.total_timesteps % args.rollout_steps):
         protocol.fail(f"--total-timesteps {args.total_timesteps}: a rollout of one step has no deviation to divide by")
@@ -406,7 +402,7 @@ if __name__ == "__main__":
                     pg_loss, v_loss, entropy = parts[:3]
                     loss = pg_loss - ent_coef * entropy + args.vf_coef * v_loss
 
-                    optimizer.zero_grad(set_to_none=False)
+                    optimizer.zero_grad(set_to_none=False)  # None would cut the network off from `parameters`
                     loss.backward()
                     nn.utils.clip_grad_norm_(parameters, args.max_grad_norm)
                     optimizer.step()

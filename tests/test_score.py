@@ -165,6 +165,18 @@ def test_other_episodes_and_environments_are_measured(task):
     assert reference.reference_returns(protocol.Task.of("toy_env:toy-v0"), [0]) is None
 
 
+def test_returns_of_a_table_or_a_file_are_not_kept(task, tmp_path):
+    """What tells two of them apart is not in their `repr`."""
+    scenario = pd.DataFrame({"year": np.arange(2025, 2101), "warming_k": 1.0})
+    for arguments in ({"scenario": scenario}, {"timber": str(Path(sim.__file__).with_name("timber_prices.csv"))}):
+        assert not all(map(reference.is_plain, arguments.values()))
+    other = protocol.Task.of("boreal-balanced-v0", scenario=scenario)
+    for _ in range(2):
+        reference.reference_returns(other, [0])
+    assert task.measured == [[0], [0]]
+    assert all(map(reference.is_plain, ({"a": (1.0, None)}, [True, "finland"])))
+
+
 def test_the_fingerprint_is_of_what_numbers_depend_on(task, monkeypatch):
     physics = reference.fingerprint(task)
     assert physics == reference.fingerprint(

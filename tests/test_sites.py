@@ -107,3 +107,10 @@ def test_support_points_fill_a_line_evenly():
     assert stats.kstest(ranks, "uniform").statistic < 0.2  # by chance 0.26
     barred = choose_sites.support_points(values, 10, barred=chosen)
     assert not set(chosen) & set(barred)
+
+
+def test_splits_share_no_episode_where_no_sites_are_drawn():
+    task = protocol.Task.of("boreal-generalist-v0", site_seed=3)
+    seeds = [set(sites.evaluation_seeds(task, 100, split)) for split in sites.SPLITS]
+    assert sum(map(len, seeds)) == len(set.union(*seeds)) == 300
+    assert min(seeds[1]) > protocol.FIRST_EVALUATION_SEED

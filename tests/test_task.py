@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scripts import run_script
-from toy_env import ToyEnv
+from toy_env import ToyEnv, ToyVectorEnv
 
 import boreal_env
 from cleanrl_style import protocol
@@ -124,3 +124,44 @@ def test_a_subclass_without_a_vector_form_is_evaluated_in_a_plain_loop():
     assert task.boreal and not task.has_lockstep
     episodes, _ = protocol.evaluate(task, lambda o, m, r: np.eye(25)[np.full(len(o), 12)], [0.5], 1, ("greedy",))
     assert np.isfinite(episodes.scalarized_return).all()
+
+
+class Doubled(gym.ObservationWrapper):
+    """Observes twice the density, as if it had been normalised otherwise."""
+
+    def observation(self, observation):
+        observation = observation.copy()
+        observation[1:] *= 2.0
+        return observation
+
+
+def doubled(**kwargs):
+    return Doubled(boreal_env.BorealEnv(**kwargs))
+
+
+gym.register("doubled-v0", entry_point=doubled, kwargs={"years": 3})
+
+
+def test_a_wrapped_environment_of_ours_is_asked_for_its_masks():
+    task = protocol.Task.of("doubled-v0")
+    assert task.boreal and not task.bare and task.masks is None
+    assert training_envs.InWorker(task.make(), 0, range(1)).get_state() is None  # a wrapper may have a state
+
+
+class NextStepEnvs(ToyVectorEnv):
+    metadata = {**ToyVectorEnv.metadata, "autoreset_mode": gym.vector.AutoresetMode.NEXT_STEP}
+
+
+class DeafEnvs(ToyVectorEnv):
+    def reset(self, *, seed=None, options=None):
+        return super().reset(seed=seed)
+
+
+@pytest.mark.parametrize("envs, what", [(NextStepEnvs, "SAME_STEP"), (DeafEnvs, "each its own of reset")])
+def test_a_vector_environment_that_is_otherwise_than_ours_is_refused(envs, what):
+    gym.register("otherwise-v0", entry_point=ToyEnv, vector_entry_point=envs)
+    try:
+        with pytest.raises(ValueError, match=f"its vector environment must .*{what}"):
+            protocol.Task.of("otherwise-v0")
+    finally:
+        gym.registry.pop("otherwise-v0")

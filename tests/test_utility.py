@@ -84,7 +84,6 @@ def test_the_ideal_point_is_of_the_best_constant_plans(monkeypatch):
     "script, flags, message",
     [
         ("ppo_gated", ("--per-objective-advantages",), "--per-objective-advantages is for --scalarization linear"),
-        ("ppo_group", (), "--scalarization chebyshev: each objective has an advantage of its own"),
         ("eupg_var_lambda", ("--utility", "future"), "--utility future is for --scalarization linear"),
         ("ppo_curriculum", ("--ideal-point", 1), "--ideal-point: 2 finite numbers"),
     ],

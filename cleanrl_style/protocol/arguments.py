@@ -21,11 +21,11 @@ DEFAULT_STEPS = {"generalist": 300_000, "site-specific": 100_000}  # of a traini
 FREE_ARGUMENTS = ("run_dir", "overwrite", "track", "wandb_project_name")
 
 
-def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -> Task:
+def make_task(args, *, preference=None, hide_site: bool = False) -> Task:
     """The environment that the arguments name. Fills them in and checks them, in place, before a file is written.
 
     preference : of every training episode, a number or weights; None has the environment draw one for each.
-    hide_site : whether its site parameters are left out of the observation. env_kwargs : more of its arguments.
+    hide_site : whether its site parameters are left out of the observation.
     Exits with one line that names the bad value and what is allowed.
     """
     check_limits(args)
@@ -41,10 +41,9 @@ def make_task(args, *, preference=None, hide_site: bool = False, **env_kwargs) -
     if args.mode != registered.mode:
         fail(f"--mode {args.mode} contradicts --env-id {args.env_id}, which is {registered.mode}")
     given = {"thaw_formulation": args.thaw_formulation, "site_seed": args.site_seed}
-    flags = {name: value for name, value in given.items() if value != getattr(registered, name, None)}
-    for name in flags if not registered.boreal else ():
+    env_kwargs = {name: value for name, value in given.items() if value != getattr(registered, name, None)}
+    for name in env_kwargs if not registered.boreal else ():
         fail(f"--{name.replace('_', '-')} is for boreal environments, not for --env-id {args.env_id}")
-    env_kwargs |= flags
     if hide_site:
         env_kwargs["observation_groups"] = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
         if not registered.boreal or not registered.site_entries:

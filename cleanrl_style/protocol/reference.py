@@ -161,8 +161,9 @@ def reference_returns(task: Task, seeds: list[int]) -> pd.DataFrame | None:
 
 def known_or_measured(task: Task, seeds: list[int]) -> pd.DataFrame:
     """The returns that ship or that this machine has measured; else they are measured, and said to be."""
-    if task.env_id not in boreal_env.REGISTERED:  # its source may lie anywhere
-        print(f"constant plans in {task.env_id}, for the score (kept for environments of the project alone)")
+    if task.env_id not in boreal_env.REGISTERED or not all(map(is_plain, task.env_kwargs.values())):
+        # its source may lie anywhere; the fingerprint does not tell two tables or functions apart
+        print(f"constant plans in {task.env_id}, for the score (kept for environments of the project alone, as they are)")
         return measure(task, seeds)
     physics, file = fingerprint(task), shipped(task.env_id)
     if file.is_file() and not set(task.env_kwargs) - {"observation_groups"}:
@@ -185,6 +186,17 @@ def known_or_measured(task: Task, seeds: list[int]) -> pd.DataFrame:
     except OSError as error:
         print(f"not kept: {path} ({error.strerror})")
     return table
+
+
+def is_plain(value) -> bool:
+    """Whether an argument is what its `repr` says: numbers and names, no table, no function and no file."""
+    if isinstance(value, dict):
+        return all(map(is_plain, value.values()))
+    if isinstance(value, (tuple, list)):
+        return all(map(is_plain, value))
+    return (
+        value is None or isinstance(value, (bool, int, float)) or (isinstance(value, str) and not Path(value).is_file())
+    )
 
 
 def measure(task: Task, seeds: list[int]) -> pd.DataFrame:

@@ -10,6 +10,8 @@ from cleanrl_style.flags import FIRST_EVALUATION_SEED, MAX_ENVS
 from cleanrl_style.protocol.task import Task
 
 SPLITS = ("test", "validation", "training")  # results are of the first; variants are chosen on the second
+#: First seed of each, where the task draws no sites.
+FIRST_OF = {"test": FIRST_EVALUATION_SEED, "validation": 2 * FIRST_EVALUATION_SEED, "training": MAX_ENVS}
 TABLE = "evaluation_sites.csv"  # written by analysis/choose_sites.py
 
 
@@ -39,7 +41,8 @@ def of_split(task: Task, episodes: int, split: str) -> tuple[Task, list[int]]:
 def evaluation_seeds(task: Task, episodes: int, split: str = "test") -> list[int]:
     """What the environments of an evaluation are reset with, a seed an episode.
 
-    The first published sites where the task draws sites, else new weathers of its own site. Raises ValueError for an
+    The first published sites where the task draws sites, else new weathers of its own site, other ones for each split
+    (site-specific there is but one). Raises ValueError for an
     unknown split, for no episode, and for more than a split has sites.
     """
     if isinstance(episodes, bool) or not isinstance(episodes, (int, np.integer)) or episodes < 1:
@@ -47,7 +50,7 @@ def evaluation_seeds(task: Task, episodes: int, split: str = "test") -> list[int
     if split not in SPLITS:
         raise ValueError(f"split {split!r}: allowed are {', '.join((*SPLITS, *task.shifts))}")
     if not task.draws_sites:
-        return [FIRST_EVALUATION_SEED + episode for episode in range(episodes)]
+        return [FIRST_OF[split] + episode for episode in range(episodes)]
     seeds = published_seeds(split)
     if episodes > len(seeds):
         raise ValueError(f"{episodes} episodes: the {split} split has {len(seeds)} sites")

@@ -1,5 +1,6 @@
 """The environment that a run is about: what it is, and what it can do. It is asked; no list of ids is kept."""
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -69,10 +70,10 @@ class Task:
                 years=one.years,
                 draws_sites=draws_sites,
                 shifts=shifts_of(env.spec.kwargs.get("boundary", "sampled")) if draws_sites else (),
-                masks=one.mask_function(),
+                masks=one.mask_function() if bare else None,  # a wrapper may change what is observed
                 observes_preference=all(name.startswith("preference") for name in front),
             )
-        else:
+        if not bare:
             task._check_behaviour(env)
         env.close()
         return task
@@ -86,7 +87,19 @@ class Task:
         if not np.array_equal(seen, weights[:-1]):
             entries = "observation 0" if len(weights) == 2 else f"observations 0 to {len(weights) - 2}"
             raise ValueError(f"reset(options={{'preference': w}}) must give w as {entries}")
-        as_mask(env.unwrapped.action_masks())
+        as_mask(env.get_wrapper_attr("action_masks")())
+        if self.has_lockstep:
+            self._check_lockstep(weights)
+
+    def _check_lockstep(self, weights: np.ndarray) -> None:
+        """Refuse a user's vector environment that restarts episodes, or takes preferences, otherwise than ours."""
+        with contextlib.closing(self.make_lockstep(2)) as envs:
+            if envs.metadata.get("autoreset_mode") is not gym.vector.AutoresetMode.SAME_STEP:
+                raise ValueError("its vector environment must restart episodes within the step: SAME_STEP autoreset")
+            both = np.stack([weights, weights[::-1]])
+            seen = envs.reset(seed=[0, 1], options={"preference": as_option(both)})[0][:, : len(weights) - 1]
+            if not np.array_equal(seen, both[:, :-1]):
+                raise ValueError("its vector environment must give each its own of reset(options={'preference': ws})")
 
     @property
     def num_objectives(self) -> int:

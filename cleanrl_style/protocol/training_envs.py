@@ -9,13 +9,15 @@ from functools import partial
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.wrappers import TimeLimit
+from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
 
 from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.hosts import Block, Streams, split
 from cleanrl_style.protocol.task import Task, as_option
 from sim.block import lanes_for
 from sim.stands import available_cores
+
+WATCHING = (OrderEnforcing, PassiveEnvChecker)  # wrappers that only watch the calls
 
 
 class InWorker(gym.Wrapper):
@@ -44,8 +46,8 @@ class InWorker(gym.Wrapper):
         return self._or_end(self.env.get_wrapper_attr("action_masks"))
 
     def get_state(self):
-        """The environment's own get_state(); None if it has none, or if a time limit counts beside it."""
-        if not hasattr(self.unwrapped, "get_state") or has_time_limit(self.env):
+        """The environment's own get_state(); None if it has none, or if a wrapper may have a state beside it."""
+        if not hasattr(self.unwrapped, "get_state") or is_wrapped(self.env):
             return None
         return self._or_end(self.unwrapped.get_state)
 
@@ -69,9 +71,9 @@ class InWorker(gym.Wrapper):
             end_process(self.streams)
 
 
-def has_time_limit(env: gym.Env) -> bool:
-    """Whether one of an environment's wrappers ends its episodes."""
-    return isinstance(env, gym.Wrapper) and (isinstance(env, TimeLimit) or has_time_limit(env.env))
+def is_wrapped(env: gym.Env) -> bool:
+    """Whether an environment is in a wrapper that does more than watch the calls."""
+    return isinstance(env, gym.Wrapper) and (not isinstance(env, WATCHING) or is_wrapped(env.env))
 
 
 def name_of(streams: range) -> str:
@@ -140,7 +142,7 @@ def get_states(envs: gym.vector.VectorEnv):
     if not isinstance(envs.unwrapped, gym.vector.AsyncVectorEnv):
         return envs.get_state() if hasattr(envs, "get_state") else None
     states = envs.call("get_state")
-    return None if None in states else states
+    return None if any(state is None for state in states) else states
 
 
 def set_states(envs: gym.vector.VectorEnv, states) -> None:
