@@ -36,29 +36,29 @@ FEWEST_SITES = 5
 LIMIT = "That a quarter of what the best constant plan gains counts as learnt is our choice; how fast is not judged."
 
 
-def less_random(evidence, evaluation: pd.DataFrame, objective: str) -> float:
-    """Mean of a return less that of random valid actions on the same episodes."""
-    random = evidence.replicates("main", "random_valid")[0].evaluation
-    if not set(evaluation.seed) <= set(random.seed):
-        raise Missing("random_valid on the same episodes")
-    return metrics.gains(evaluation, random)[objective].mean()
+def less_nothing(evidence, evaluation: pd.DataFrame, objective: str) -> float:
+    """Mean of a return less that of doing nothing on the same episodes."""
+    nothing = evidence.replicates("main", "zero_change")[0].evaluation
+    if not set(evaluation.seed) <= set(nothing.seed):
+        raise Missing("zero_change on the same episodes")
+    return metrics.gains(evaluation, nothing)[objective].mean()
 
 
 def learnt(evidence, weight: float) -> pd.Series:
-    """An agent's own return less that of random valid actions, by training seed."""
+    """An agent's own return less that of doing nothing, by training seed."""
     return pd.Series(
         {
-            run.arguments["seed"]: less_random(evidence, run.evaluation, OBJECTIVE[weight])
+            run.arguments["seed"]: less_nothing(evidence, run.evaluation, OBJECTIVE[weight])
             for run in evidence.agents("fixed", weight)
         }
     )
 
 
 def attainable(evidence, weight: float) -> float:
-    """What the best constant plan for the weight has over random valid actions."""
+    """What the best constant plan for the weight has over doing nothing."""
     plans = evidence.study("constant_plans")
     best = as_evaluation(of_environment(plans, GENERALIST), (weight,))
-    return less_random(evidence, best, OBJECTIVE[weight])
+    return less_nothing(evidence, best, OBJECTIVE[weight])
 
 
 def share_learnt(evidence, weight: float) -> pd.Series:
@@ -70,7 +70,7 @@ def rows_of(evidence, weight: float, papers: str) -> list[Row]:
     """The lines of an agent of one weight."""
     name = OBJECTIVE[weight].replace("_", " ")
     return [
-        Row(f"{name} less that of random actions, same sites", papers, seeds(learnt(evidence, weight))),
+        Row(f"{name} less that of doing nothing, same sites", papers, seeds(learnt(evidence, weight))),
         Row("the same of the best constant plan", "", Number(attainable(evidence, weight))),
         Row("share of it learnt", papers, seeds(share_learnt(evidence, weight))),
     ]

@@ -135,6 +135,9 @@ def row_of_runs(key: tuple, replicates: list, objectives=("carbon", "thaw")) -> 
     """A row: statistics over training seeds, of the evaluation and the gains of each."""
     rows = [run_metrics(one.evaluation, one.gains) for one in replicates]
     table = pd.DataFrame(rows, columns=numbers(objectives))
+    responses = table.columns[table.columns.str.endswith(("_change", "_slope"))]
+    if table[responses].notna().any(axis=None):  # what does the same at every weight is one that does not respond
+        table[responses] = table[responses].fillna(0.0)
     row = row_of(key, len(table)) | over_seeds(table.drop(columns="sd_over_episodes"))
     row |= scores(replicates) | {"sd_over_episodes": table.sd_over_episodes.mean()}
     policies = {run.primary for one in replicates for run in one.runs}

@@ -163,7 +163,7 @@ def known_or_measured(task: Task, seeds: list[int]) -> pd.DataFrame:
     """The returns that ship or that this machine has measured; else they are measured, and said to be."""
     if task.env_id not in boreal_env.REGISTERED or not all(map(is_plain, task.env_kwargs.values())):
         # its source may lie anywhere; the fingerprint does not tell two tables or functions apart
-        print(f"constant plans in {task.env_id}, for the score (kept for environments of the project alone, as they are)")
+        print(f"constant plans in {task.env_id}, for the score (kept for those of the project alone)")
         return measure(task, seeds)
     physics, file = fingerprint(task), shipped(task.env_id)
     if file.is_file() and not set(task.env_kwargs) - {"observation_groups"}:
