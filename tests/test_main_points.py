@@ -69,18 +69,23 @@ def test_the_score_of_a_single_training_is_not_shown(results):
 
 
 def test_the_words_follow_from_the_numbers(results):
-    assert " ".join(main_points.in_words(results).split()) == (
-        "- **`boreal-balanced-v0`** - Plans that look at nothing: 100 stems a year, half of them conifers, score 70, "
-        "100 deciduous trees a year 95 [90, 100]. All constant plans together have a gain hypervolume of 3.00. The "
-        "best of each weight, which 100 stands for, gain 0.5 % less when they are chosen on a half of the sites and "
-        "judged on the other. - Of 5 trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds. "
-        "Its score less that of 100 "
-        "deciduous trees a year is 15.0. By the interval of the difference on the same sites none is above 100, Group"
-        " PPO is not told apart from it; Group PPO is above planting half and half; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run "
-        "yet: Curriculum PPO. - Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. "
-        "Asked for thaw instead of carbon, Group PPO keeps more cold in the ground, and PPO Gated keeps less. "
-        "Variable λ EUPG does the same whatever is asked for. (Greedy; 0 is in neither the interval "
-        "over seeds and sites nor the t interval over seeds.)"
+    plans, ahead, followed = (" ".join(point.split()) for point in main_points.in_words(results).split("\n  - ")[1:])
+    assert plans == (
+        "Plans that look at nothing: 100 stems a year, half of them conifers, score 70, 100 deciduous trees a year 95 "
+        "[90, 100]. All constant plans together have a gain hypervolume of 3.00. The best of each weight, which 100 "
+        "stands for, gain 0.5 % less when they are chosen on a half of the sites and judged on the other."
+    )
+    assert ahead == (
+        "Of 5 trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds. Its score less that of "
+        "100 deciduous trees a year is 15.0. By the interval of the difference on the same sites none is above 100, "
+        "Group PPO is not told apart from it; Group PPO is above planting half and half; Variable λ EUPG is below "
+        "that. Few training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
+    )
+    assert followed == (
+        "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. Asked for thaw instead of "
+        "carbon, Group PPO keeps more cold in the ground, and PPO Gated keeps less. Variable λ EUPG does the same "
+        "whatever is asked for. (Greedy; 0 is in neither the interval over seeds and sites nor the t interval over "
+        "seeds.)"
     )
 
 
