@@ -166,7 +166,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `Box` of 105 values (generalist) or 43 (site-specific, without the 62 site parameters), float32;
     `boreal_env.OBSERVATION` has the name, unit, normalisation and limits of each, `observation_names` the names of
     those that this environment gives. The first is the preference for carbon (of m objectives the weights of the first
-    m - 1; a single objective has none). Of two years the last comes first. Age fractions are of all stems.
+    m - 1; a single objective has none). Where two years are given, the most recent is first. Age fractions are of all
+    stems.
 
     ## Action Space
     `Discrete(25)`: action = 5 x density index + mix index; density changes (-100, -50, 0, 50, 100) stems/ha, conifer
@@ -179,7 +180,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     ## Reward Space
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, dead wood, soil and products over `carbon_scale`,
     less penalties. Thaw: a year's heat up through a boundary of fixed temperature, 12 m deep, less 2.5 times the heat
-    down through it, over 40 MJ/m2. Ready beside them is thaw as the field measures it: "active_layer", 1 - thaw depth /
+    down through it, over 40 MJ/m2. Also available: thaw as the field measures it, "active_layer", 1 - thaw depth /
     1 m, and "permafrost_heat", -1 - heat of the upper 3 m / 135 MJ/m2 (1 is frozen at -2 degC, -1 thawed at 0 degC);
     "timber", the year's net revenue at the prices of `timber`, discounted, over 3000 EUR/ha, so that the return is the
     net present value over that; and "biodiversity", a quarter of an index in [0, 1] of species and ages, old trees,
@@ -198,8 +199,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     are the paper's: use them to compare with it. There the boundary's temperature is drawn without regard to the
     climate, and so which site was drawn decides nearly all of the thaw return. `boreal-timber-v0` is the balanced
     task with a third objective, timber at Finnish prices, `boreal-four-v0` with biodiversity as a fourth.
-    `boreal-warming-v0` is it from 2025 on under the scenario SSP2-4.5: the ground starts in balance with the
-    climate of 1995-2014, and warms.
+    `boreal-warming-v0` is the balanced task from 2025 on under the scenario SSP2-4.5: the ground starts in balance with
+    the climate of 1995-2014, and warms.
 
     ## Episode Termination
     After 50 years the episode is terminated: nothing is worth anything beyond.
@@ -250,7 +251,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `info` is empty but for the last step, where it has the episode's totals (and for `record_steps`). Bad values raise
     ValueError, a step before reset or after the end RuntimeError.
 
-    ## What It Can Be Asked
+    ## Attributes and Methods
     `objective_names`, `reward_dim`, `mode`, `years`, `thaw_formulation`, `site_seed` and `observation_names` are
     attributes. `lockstep(num_envs, **changes)` gives a `BorealVectorEnv` with the same arguments but for the changes,
     `mask_function()` a function of observations (n, entries) to valid actions, bool (n, 25), which can be pickled; it

@@ -52,9 +52,9 @@ def page() -> str:
     columns = textwrap.fill(", ".join(f"`{name}`" for name in boreal_env.REWARD_COLUMNS), 120)
     return f"""# The environment
 
-*Made from `boreal_env.py` by `python analysis/document_environment.py`.* How it goes with gymnasium's,
-mo-gymnasium's and other libraries is in [clients.md](clients.md); where the paper is silent, in
-[decisions.md](decisions.md).
+*Made from `boreal_env.py` by `python analysis/document_environment.py`.* [clients.md](clients.md) has
+its use with gymnasium's, mo-gymnasium's and other libraries; [decisions.md](decisions.md) what was chosen where the paper
+is silent.
 
 {inspect.getdoc(BorealEnv)}
 

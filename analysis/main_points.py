@@ -209,9 +209,7 @@ def following(rows: dict[tuple[str, str], list]) -> str:
     )
     text += f", and {named(less_cold, 'keep')} less." if less_cold else "."
     text += f" {named(unmoved, 'do')} the same whatever is asked for." if unmoved else ""
-    return (
-        f"{text} (Of greedy policies; 0 is in neither the interval over seeds and sites nor the t interval of seeds.)"
-    )
+    return f"{text} (Greedy; 0 is in neither the interval over seeds and sites nor the t interval over seeds.)"
 
 
 def wrapped(text: str) -> str:

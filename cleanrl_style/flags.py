@@ -111,7 +111,7 @@ def describe(arguments: type) -> str:
     if not hasattr(arguments, "total_timesteps"):
         return arguments.__doc__
     # a script that updates after every episode has one stand at a time, which takes five times as long
-    usual = (6000, "forty minutes") if getattr(arguments, "num_envs", None) == 1 else (32000, "five to ten minutes")
+    usual = (6000, "forty minutes") if getattr(arguments, "num_envs", None) == 1 else (32000, "three to ten minutes")
     steps, whole = getattr(arguments, "trial", usual)
     lockstep = " --vectorization lockstep" if hasattr(arguments, "vectorization") else ""
     left = """A stopped run goes on with the same
