@@ -53,8 +53,8 @@ def page() -> str:
     return f"""# The environment
 
 *Made from `boreal_env.py` by `python analysis/document_environment.py`.* [clients.md](clients.md) has
-its use with gymnasium's, mo-gymnasium's and other libraries; [decisions.md](decisions.md) what was chosen where the paper
-is silent.
+its use with gymnasium's, mo-gymnasium's and other libraries; [decisions.md](decisions.md) what was chosen where the
+paper is silent.
 
 {inspect.getdoc(BorealEnv)}
 
