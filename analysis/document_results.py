@@ -241,26 +241,32 @@ def choices(results: Results) -> str:
 
 
 def averaged(results: Results) -> str:
-    """Scores of policies of several trainings averaged, beside those of each for itself."""
+    """Scores of policies of several trainings averaged, beside those of each for itself, and what they are apart."""
     table = results.study("ensembles")
     if table is None:
         return "Not run yet: `python analysis/studies/ensembles.py`.\n"
-    rows = {}
+    rows: dict[int, list[str]] = {}
     for task, of_task in table.groupby("task", sort=False):
         alone = main_points.default_rows(results, task).get((ensembles.SCRIPT, ""), [])
         if not alone or alone[0].plans is None:
             continue
-        sets = {1: pd.DataFrame([metrics.of_sites(one.by_policy["greedy"]) for one in alone])}
-        for size, of_size in of_task.groupby("size"):
-            sets[size] = of_size.pivot(index="first_seed", columns="seed", values="gain")
+        seeds = [one.runs[0].arguments["seed"] for one in alone]
+        members = pd.DataFrame([metrics.of_sites(one.by_policy["greedy"]) for one in alone], index=seeds).sort_index()
         plans = metrics.plans_of_sites(alone[0].plans, np.unique(metrics.weights_of(alone[0].gains), axis=0))
-        for size, gained in sets.items():
-            # a single set varies between sites alone
-            score = metrics.score_interval(np.repeat(gained, 2, axis=0) if len(gained) == 1 else gained, plans)
+        for size, of_size in [(1, None), *of_task.groupby("size")]:
+            gained = members if of_size is None else of_size.pivot(index="first_seed", columns="seed", values="gain")
+            of_sets = [members.loc[chosen].mean() for chosen in ensembles.sets_of(list(members.index), size)]
+            apart = gained.reset_index(drop=True) - pd.DataFrame(of_sets)
             cells = rows.setdefault(size, [str(size), str(len(gained))])
-            cells.append("{:.1f} [{:.1f}, {:.1f}]".format(*score))
-    titles = [f"`{task}`" for task in dict.fromkeys(table.task)]
+            cells += [in_points(gained, plans), "" if size == 1 else in_points(apart, plans)]
+    titles = [title for task in dict.fromkeys(table.task) for title in (f"`{task}`", "less its members'")]
     return excerpts.markdown(["trainings together", "sets", *titles], list(rows.values()))
+
+
+def in_points(gained: pd.DataFrame, plans: np.ndarray) -> str:
+    """Score of sets of trainings (sets, sites) with its interval; that of a single set is over sites alone."""
+    score = metrics.score_interval(np.repeat(gained, 2, axis=0) if len(gained) == 1 else gained, plans)
+    return "{:.1f} [{:.1f}, {:.1f}]".format(*score)
 
 
 def sites_alone(results: Results) -> str:
