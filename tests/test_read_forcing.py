@@ -245,6 +245,15 @@ def test_longwave_of_a_gap_is_computed():
     assert (error.drop(error.index[8000:8101]) == 0.0).all() and error.abs().max() < 80.0
 
 
+def test_longwave_of_a_short_gap_lies_on_a_line():
+    table = records.icos()
+    before, after = table.loc[[7999, 8006], "LW_IN"]
+    table.loc[8000:8005, "LW_IN"] = -9999
+    forcing = sim.read_forcing(table, gaps="fill", **SWEDEN)
+    filled = forcing.longwave_w_m2[flags(forcing, "longwave_w_m2") == 2]
+    np.testing.assert_allclose(filled, np.linspace(before, after, 8)[1:-1])
+
+
 def test_the_cycle_of_a_day_is_the_one_of_svartberget(weather):
     found = sim.diurnal_cycle(weather["air_temperature_c"], weather["shortwave_w_m2"])
     assert found.half_range_per_shortwave == pytest.approx(FOREST_CYCLE.half_range_per_shortwave, rel=5e-3)
@@ -409,6 +418,10 @@ BAD = {
         with_times(lambda t: ["2019-13-45"], [3000]),
         r"row 3000: TIMESTAMP_START is '2019-13-45'; a time as",
     ),
+    "a time of days first": (
+        with_times(lambda t: ["31.12.2019 12:00"], [3000]),
+        r"row 3000: TIMESTAMP_START is '31.12.2019 12:00'; .*of days first: read it by pandas",
+    ),
     "a time that is missing": (
         with_times(lambda t: [None], [3000]),
         r"row 3000: TIMESTAMP_START is (None|nan); a time as",
@@ -480,6 +493,10 @@ BAD_ARGUMENTS = {
     "column without a unit": (
         {"columns": {"wind_speed": "WD"}},
         r"units are not known; say units={'WD': ..}: WD in m s-1, km h-1",
+    ),
+    "a list for a column": (
+        {"columns": {"humidity": ["RH"]}},
+        r"columns: a text for 'humidity' is allowed, got \['RH'\]",
     ),
     "years of another record": (
         {"years": 2020},
@@ -729,6 +746,11 @@ def test_a_gap_that_is_too_long_is_refused():
 
 BAD_FILES = {
     "nothing": ("", r"line 1: a row of column names is needed, got nothing"),
+    "no names": (
+        "201901010000,1.5,-2\n201901010030,1,2\n",
+        r"line 1: a row of column names is needed, got numbers, 2019",
+    ),
+    "columns apart by blanks": ("time TA RH\n20190101 1 2\n", r"line 1: columns separated by comma, semicolon or tab"),
     "a column twice": ("TIMESTAMP,TA_F,TA_F\n20190101,1,1\n", r"line 1: column TA_F is there twice"),
     "nothing but names": ("TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n", r"tower.csv: 0 rows; whole days"),
     "decimal commas": (
