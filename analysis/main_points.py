@@ -182,8 +182,7 @@ def paragraph(results, env_id: str) -> str:
 
 def responses(replicates: list) -> np.ndarray:
     """Change of the greedy policy's returns from the lowest to the highest weight, (returns, seeds, sites)."""
-    pairs = [metrics.paired_returns(one.by_policy["greedy"])[1] for one in replicates]
-    return np.stack([returns[:, -1] - returns[:, 0] for returns in pairs]).transpose(2, 0, 1)
+    return np.stack([metrics.response_of_sites(one.by_policy["greedy"]) for one in replicates], axis=1)
 
 
 def ends(changes: np.ndarray) -> tuple[float, float]:

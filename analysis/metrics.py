@@ -145,6 +145,12 @@ def preference_response(evaluation: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
+def response_of_sites(evaluation: pd.DataFrame) -> np.ndarray:
+    """Change of every return from the lowest weight to the highest on each site, (m, sites), by ascending seed."""
+    _, returns = paired_returns(evaluation)
+    return (returns[:, -1] - returns[:, 0]).T
+
+
 # ------------------------------------------------------------------------------------ over training seeds
 
 

@@ -1,7 +1,7 @@
 """What each choice of Group PPO is worth: its runs with one thing changed less those without, paired by training seed.
 
-A difference of scores is over the same sites, and its 95 % interval over seeds and sites together. How far the
-preference is followed is the change of a return from weight 0 to 1: its difference has an interval over seeds.
+How far the preference is followed is the change of a return from weight 0 to 1. Differences are over the same sites,
+and their 95 % intervals over seeds and sites together.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ import pandas as pd
 
 from analysis import metrics
 from analysis.experiments import BALANCED, GENERALIST
-from analysis.tables.common import over_seeds, row_of
+from analysis.tables.common import row_of
 from analysis.tables.main_results import named
 from cleanrl_style import protocol
 
@@ -45,11 +45,6 @@ def score_difference(pairs: list[tuple], policy: str) -> tuple[float, float, flo
     return metrics.score_interval(pd.DataFrame(sites), metrics.plans_of_sites(plans, weights))
 
 
-def followed(one) -> np.ndarray:
-    """Change of both returns from weight 0 to 1."""
-    return metrics.preference_response(one.evaluation).change.to_numpy()
-
-
 def make(results) -> pd.DataFrame:
     """One row per changed choice."""
     defaults = {GENERALIST: by_seed(results.of("main", SCRIPT)), BALANCED: by_seed(results.of("balanced", SCRIPT))}
@@ -61,7 +56,11 @@ def make(results) -> pd.DataFrame:
         if pairs:
             for policy in protocol.POLICIES:
                 row |= named(f"score_{policy}", *score_difference(pairs, policy))
-            changes = np.array([followed(one) - followed(other) for one, other in pairs])
-            row |= over_seeds(pd.DataFrame(changes, columns=list(CHANGES)))
+            sites = [
+                metrics.response_of_sites(one.evaluation) - metrics.response_of_sites(other.evaluation)
+                for one, other in pairs
+            ]
+            for name, change in zip(CHANGES, np.stack(sites, axis=1), strict=True):
+                row |= named(name, *metrics.score_interval(change, None))
         rows.append(row)
     return pd.DataFrame(rows)
