@@ -42,7 +42,7 @@ SENTENCES = (
         performance.curriculum_beats_gated,
         "scalarised, Curriculum less Gated",
         "Choosing sites pays: Curriculum PPO is better than PPO Gated",
-        "Choosing sites pays nothing that counts here: Curriculum PPO is not told to be better than PPO Gated",
+        "Choosing sites pays little or nothing here: Curriculum PPO is not shown to be better than PPO Gated",
         "Whether choosing sites pays is open",
     ),
     Sentence(
@@ -77,7 +77,7 @@ SENTENCES = (
         curriculum.coin,
         "difference, paired by seed",
         "Selecting by site is worth more than selecting by a coin",
-        "Selecting by site is worth nothing that counts more than selecting by a coin",
+        "Selecting by site is worth little or no more than selecting by a coin",
         "Whether selecting by site is worth more than selecting by a coin is open",
     ),
     Sentence(
