@@ -51,7 +51,7 @@ from cleanrl_style import protocol
 THEMES = (environment, asymmetry, performance, preference, curriculum, mechanisms, strategies, speed, paper_itself)
 MEANING = {
     HOLDS: "our numbers meet the rule that the claim names",
-    FAILS: "they meet its opposite, or what there is of it is less than counts",
+    FAILS: "they meet its opposite, or an effect too small to count",
     COMPARED: "a level of another simulator, beside ours",
     CONTRADICTS: "another number of the paper, or its own definitions, exclude it",
     UNTESTABLE: "what it needs is not logged, or not there",
