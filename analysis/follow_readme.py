@@ -22,6 +22,7 @@ from cleanrl_style import protocol
 
 ROOT = Path(__file__).parents[1]
 CLONE = "git clone <URL of this repository>"
+QUICK = "pytest -m quick"  # named below that block
 
 
 @dataclass
@@ -44,9 +45,9 @@ def steps(lines: list[str]) -> list[str]:
 
 
 def name(command: str) -> str:
-    """What the README calls a command: its first words, without flags."""
+    """What the README calls a command: a script without its flags, anything else as it is."""
     words = command.split()
-    return command if words[0] == "pip" else " ".join(word for word in words[:2] if not word.startswith("-"))
+    return " ".join(word for word in words[:2] if not word.startswith("-")) if words[0] == "python" else command
 
 
 def prepare(folder: Path) -> dict[str, str]:
@@ -77,7 +78,7 @@ def follow(wanted: list[str], folder: Path, environment: dict[str, str]) -> tupl
 def main(args: Args) -> None:
     """Clone, run, write."""
     make_writable("--results", args.results)
-    wanted = steps(commands((ROOT / "README.md").read_text(encoding="utf-8")))
+    wanted = [*steps(commands((ROOT / "README.md").read_text(encoding="utf-8"))), QUICK]
     with tempfile.TemporaryDirectory() as work:
         folder = Path(work, "borearl")
         table, printed = follow(wanted, folder, prepare(folder))

@@ -97,6 +97,7 @@ def test_what_follow_readme_does_is_what_the_readme_says():
     assert lines[0].startswith(follow_readme.CLONE)
     steps = follow_readme.steps(lines)
     assert [follow_readme.name(step).split()[0] for step in steps] == ["pip", "python", "pip", "pytest"]
+    assert f"`{follow_readme.QUICK}`" in TEXTS[ROOT / "README.md"]
 
 
 def test_follow_readme_times_commands_and_names_the_one_that_fails(tmp_path):
