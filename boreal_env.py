@@ -195,10 +195,11 @@ class BorealEnv(Described, gym.Env, EzPickle):
     ## Which Id
     `boreal-balanced-v0` is the task to study policies with: the ground below is in balance with the climate and the
     first stand above it, the soil's carbon with its litter, weather varies from day to day as on record, and both
-    returns vary equally between the policies worth choosing. `boreal-generalist-v0` and `boreal-site-specific-v0`
-    are the paper's: use them to compare with it. There the boundary's temperature is drawn without regard to the
-    climate, and so which site was drawn decides nearly all of the thaw return. `boreal-timber-v0` is the balanced
-    task with a third objective, timber at Finnish prices, `boreal-four-v0` with biodiversity as a fourth.
+    returns vary equally between the policies that, on a site, none beats in both. `boreal-generalist-v0` and
+    `boreal-site-specific-v0` are the paper's: use them to compare with it. There the boundary's temperature is drawn
+    without regard to the climate, and so which site was drawn decides nearly all of the thaw return (in the balanced
+    task, most of it). `boreal-timber-v0` is the balanced task with a third objective, timber at Finnish prices,
+    `boreal-four-v0` with biodiversity as a fourth.
     `boreal-warming-v0` is the balanced task from 2025 on under the scenario SSP2-4.5: the ground starts in balance with
     the climate of 1995-2014, and warms.
 
@@ -209,7 +210,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `mode`: "generalist" or "site-specific"
     - `years`: length of an episode (50)
     - `time_step_minutes`: a divisor of 1440, at most 120 (30)
-    - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (on a GPU, for thousands of stands)
+    - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (for thousands of stands; not yet run on
+      a GPU, only in numba's simulator of one)
     - `thaw_formulation`: "asymmetric", "contrast" or "raw_degree_days"
     - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one, or the weights of all objectives
     - `site_seed`: one site (`sim.sample_site(site_seed)`) instead of a new one each episode

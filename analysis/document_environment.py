@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import boreal_env
+import sim
 from boreal_env import BALANCED_CARBON_SCALE, BorealEnv, BorealVectorEnv, Objective, Observed, Reward
 from cleanrl_style.flags import fail, parse
 from sim.task.observation import observation_rows
@@ -79,6 +80,12 @@ in its unit again.
 
 {table(("index", "name", "unit", "normalised", "limits", "group"), map(observation_row, enumerate(rows)))}
 
+## First stocks
+Drawn uniformly between these, unless `initial_ranges` says otherwise; biomass within what the stems can hold, and
+their age follows from it. `boreal-balanced-v0` takes the soil's carbon that the first stand's litter keeps up.
+
+{table(("stock", "lowest", "highest"), ((f"`{k}`", *(f"{x:g}" for x in v)) for k, v in sim.INITIAL_RANGES.items()))}
+
 ## Reward, constant by constant
 `boreal_env.Reward`; the paper's values. `boreal-balanced-v0` has `carbon_scale = {boreal_env.BALANCED_CARBON_SCALE:g}`
 and keeps it when `reward` is a dict of other constants.
@@ -88,6 +95,16 @@ and keeps it when `reward` is a dict of other constants.
 So a carbon return of 1 is {Reward().carbon_scale:g} kgC m-2 more in the stand and its products
 ({BALANCED_CARBON_SCALE:g} in `boreal-balanced-v0`), and a thaw return of 1 is {Reward().thaw_scale:g} MJ m-2 that went
 up through the boundary.
+
+Each year, with the names of the record: the carbon reward is `carbon_change`, the net change of all stocks over
+`carbon_scale`, clipped to -1 .. 1, plus the two bonuses (0 as it stands), less
+- `biomass_limit_penalty`: `limit_penalty` x the share by which biomass exceeds `biomass_limit`, and
+  `soil_limit_penalty` alike;
+- `density_penalty`, where stems after the action reach `density_limit`;
+- `ineffective_penalty` x the share of the asked change of density that could not be carried out.
+
+The thaw reward is (heat up - `warming_weight` x heat down) / `thaw_scale`. Both are clipped to -1 .. 1 at the end. A
+return is the plain sum over the years, not discounted.
 
 What the environment adds to the annual record:
 {columns}

@@ -92,6 +92,12 @@ def points(replicates: list, other: list, best_plans: list) -> str:
     return f"{value:.1f}" if len(replicates) < 2 else f"{value:.1f} [{low:.1f}, {high:.1f}]"
 
 
+def gain_hypervolume(replicates: list) -> float:
+    """Of the greedy policies' mean gains, over training seeds."""
+    gains = pd.DataFrame([main_results.gain_metrics(one.gains) for one in replicates])
+    return main_results.over_seeds(gains)["gain_hypervolume"]
+
+
 def front_of_plans(results, env_id: str) -> float:
     """Gain hypervolume of all constant plans together."""
     plans = results.constant_plans_in(env_id, "asymmetric", None)
@@ -150,6 +156,8 @@ def paragraph(results, env_id: str) -> str:
         for method in trained
         if len(rows[method]) > 1 and not is_above(rows[method], best_plans) and not is_below(rows[method], best_plans)
     ]
+    under = [method for method in trained if is_below(rows[method], best_plans)]
+    below_it = "all are below it" if len(under) == len(trained) else f"{len(under)} below it"
     plans = (
         f"Plans that look at nothing: 100 stems a year, half of them conifers, score {known[PLANTING]:.0f}, 100 "
         f"deciduous trees a year {shown(main_results.scores(deciduous))}. All constant plans together have a gain "
@@ -158,7 +166,8 @@ def paragraph(results, env_id: str) -> str:
     )
     ahead = (
         f"Of {len(trained)} trained method{'s' if len(trained) > 1 else ''} {methods.title(*best)} scores highest, "
-        f"{shown(scores[best])} with {of_seeds(rows[best])}"
+        f"{shown(scores[best])} with {of_seeds(rows[best])} and a gain hypervolume of "
+        f"{gain_hypervolume(rows[best]):.2f}"
     )
     ahead += f", not told apart from {listed(titles_of(alike))}." if alike else "."
     ahead += (
@@ -166,6 +175,7 @@ def paragraph(results, env_id: str) -> str:
         "By the interval of the difference on the same sites "
         f"{named(above(best_plans))} above 100"
         + (f", {named(even)} not told apart from it" if even else "")
+        + (f", {below_it}" if under else "")
         + f"; {named(above(rows[PLANTING]))} above planting half and half; "
         f"{named(below)} below that."
     )

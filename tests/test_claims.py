@@ -363,7 +363,7 @@ def test_time_from_the_log_and_the_benchmark(five_seeds):
     assert found(speed.workers, five_seeds, studies)[0].verdict == HOLDS  # ten times, the paper's least is four
     finding, ours = found(speed.TRAINING[0], five_seeds)
     assert finding.verdict == HOLDS  # 600 + 120 s
-    assert ours["hours of 300,000 steps in lockstep on one core"].value == pytest.approx(0.2)
+    assert ours["hours of 300,000 steps of PPO in lockstep on one core"].value == pytest.approx(0.2)
     assert found(speed.dollars, five_seeds)[1]["USD a training"].value == pytest.approx(0.3 * 0.68)
 
 

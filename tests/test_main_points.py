@@ -34,7 +34,11 @@ def results(monkeypatch):
 
     def scores(replicates):
         value = SCORES[replicates[0]]
-        return {"score_greedy": value, "score_greedy_low": value - 5.0, "score_greedy_high": value + 5.0}
+        return {
+            "score_greedy": value,
+            "score_greedy_low": value - 5.0,
+            "score_greedy_high": value + 5.0,
+        }
 
     plans = {(name, env_id, "default"): [PLANS[name]] for name in PLANS for env_id in main_points.WORLDS}
     monkeypatch.setattr(main_results, "scores", scores)
@@ -43,6 +47,7 @@ def results(monkeypatch):
     monkeypatch.setattr(main_points, "is_above", lambda one, other: SCORES[one[0]] > SCORES[other[0]] + 20)
     monkeypatch.setattr(main_points, "is_below", lambda one, other: SCORES[one[0]] < SCORES[other[0]] - 5)
     monkeypatch.setattr(main_points, "points", lambda one, other, best: f"{SCORES[one[0]] - SCORES[other[0]]:.1f}")
+    monkeypatch.setattr(main_points, "gain_hypervolume", lambda replicates: 2.5)
     monkeypatch.setattr(main_points, "front_of_plans", lambda results, env_id: 3.0)
     monkeypatch.setattr(main_points, "flattery", lambda results, env_id: 0.5)
     return SimpleNamespace(rows_of_two_objectives=lambda: rows)
@@ -76,10 +81,10 @@ def test_the_words_follow_from_the_numbers(results):
         "stands for, gain 0.5 % less when they are chosen on a half of the sites and judged on the other."
     )
     assert ahead == (
-        "Of 5 trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds. Its score less that of "
-        "100 deciduous trees a year is 15.0. By the interval of the difference on the same sites none is above 100, "
-        "Group PPO is not told apart from it; Group PPO is above planting half and half; Variable λ EUPG is below "
-        "that. Few training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
+        "Of 5 trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds and a gain hypervolume "
+        "of 2.50. Its score less that of 100 deciduous trees a year is 15.0. By the interval of the difference on the "
+        "same sites none is above 100, Group PPO is not told apart from it, 4 below it; Group PPO is above planting "
+        "half and half; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
     )
     assert followed == (
         "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. Asked for thaw instead of "

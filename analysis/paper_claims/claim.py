@@ -202,7 +202,7 @@ def about(number: Number, low: float, high: float | None = None, what: str = "th
 
 def opposite(answer: Answer) -> Answer:
     """Holds if the answer does not."""
-    return Answer(None if answer.holds is None else not answer.holds, f"this fails: {answer.rule}", answer.waits)
+    return Answer(None if answer.holds is None else not answer.holds, f"it is not so that {answer.rule}", answer.waits)
 
 
 def all_of(*answers: Answer) -> Answer:

@@ -158,7 +158,7 @@ def magnitude_does_not_matter(evidence):
         for name in ("carbon", "thaw")
     ]
     magnitude = opposite(above(apart, least=LEAST, what="the difference of thaw returns"))
-    return finding(rows, all_of(magnitude, above(symmetric, least=LEAST, what="the gain without asymmetry")))
+    return finding(rows, all_of(above(symmetric, least=LEAST, what="the gain without asymmetry"), magnitude))
 
 
 def by_thaw(evidence, script: str) -> pd.Series:

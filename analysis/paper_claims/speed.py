@@ -81,7 +81,8 @@ def training_claim(statement: str, command: str, experiment: str, script: str, n
         values = [training_hours(run) for one in evidence.replicates(experiment, script) for run in one.runs]
         ours = seeds(pd.Series(values))
         steps = evidence.job(experiment, script).steps
-        rows = [Row(f"hours of {steps:,} steps in lockstep on one core", published(name), ours)]
+        method = {"eupg": "EUPG", "ppo": "PPO"}[script.split("_")[0]]
+        rows = [Row(f"hours of {steps:,} steps of {method} in lockstep on one core", published(name), ours)]
         return finding(rows, below(ours, most(name)))
 
     return training
