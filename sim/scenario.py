@@ -64,7 +64,7 @@ def check_scenario(scenario) -> Path | None:
     """A name of `SCENARIOS`, or a path of the user's, checked; None for none.
 
     A path is a dict or a DataFrame of one or more of `COLUMNS`. Its years are a column `year`, the index of a table (if
-    it is named so, or has dates or numbers from `LEAST_YEAR` on), or the keys of a dict in place of a column; what is
+    it has a name, dates, texts, or numbers from `LEAST_YEAR` on), or the keys of a dict in place of a column; what is
     before `FIRST_YEAR` is left out. Without years the first value is that of `FIRST_YEAR`. Raises ValueError naming
     the value and what is allowed.
     """
@@ -105,7 +105,7 @@ def _check_column(name: str, values, years) -> np.ndarray:
     except (TypeError, ValueError):
         raise ValueError(f"scenario {name}: a number for each year is allowed, got {_no_number(values)!r}") from None
     if numbers.ndim != 1 or not len(numbers):
-        raise ValueError(f"scenario {name}: a number for each year is allowed, got {values!r}")
+        raise ValueError(f"scenario {name}: a number for each year is allowed, got {brief(values)}")
     if years is None:
         years = FIRST_YEAR + np.arange(len(numbers))
     else:
@@ -140,8 +140,8 @@ def _years(values):
     dates = getattr(index, "year", None)
     if dates is not None:
         return dates
-    numbers = index.dtype.kind in "if"
-    return index if index.name == YEAR or (numbers and len(index) and index[0] >= LEAST_YEAR) else None
+    rows = index.name is None and index.dtype.kind in "if" and (not len(index) or index[0] < LEAST_YEAR)
+    return None if rows else list(index)
 
 
 def _check_years(name: str, given, number: int) -> np.ndarray:
@@ -149,7 +149,7 @@ def _check_years(name: str, given, number: int) -> np.ndarray:
     try:
         years = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"scenario {name}: its years have to be integers, got {given!r}") from None
+        raise ValueError(f"scenario {name}: its years have to be integers, got {_no_number(given)!r}") from None
     if years.shape != (number,):
         raise ValueError(f"scenario {name}: {number} values of {years.size} years; a value each is allowed")
     apart = np.flatnonzero(np.diff(years) != 1.0)

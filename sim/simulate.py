@@ -75,7 +75,7 @@ def simulate(
         weather generator takes of the site, such as rain and wind, nor does `weather`.
     actions : integer in [0, 25) for every year, or a sequence with one a year; None changes nothing.
     seed : of first state, weather and disturbances.
-    years : years to run, at most 10,000; by default those of the forcing, or 50.
+    years : years to run, at most 5,000; by default those of the forcing, or 50.
     forcing : observed weather instead of the generator, as `sim.read_forcing` returns it: DataFrame with a regular
         DatetimeIndex of local solar time (start of the interval, from midnight) and the columns air_temperature_c
         [degC], relative_humidity [0-1, over water], wind_speed_m_s, shortwave_w_m2, longwave_w_m2 [W m-2],

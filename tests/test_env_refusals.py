@@ -4,6 +4,7 @@ import gymnasium as gym
 import pytest
 from playing import NAN, play, quick, quick_vector
 
+import sim
 from boreal_env import BorealEnv, BorealVectorEnv
 
 BAD_ARGUMENTS = {
@@ -139,6 +140,14 @@ def test_reset_refuses(options, message):
     for env in (quick(), quick_vector(2)):
         with pytest.raises(ValueError, match=message):
             env.reset(seed=1, options=options)
+
+
+def test_a_boundary_of_ones_own_is_refused_where_it_is_found():
+    world = sim.sample_site(3)
+    for env in (quick(boundary="balanced"), quick_vector(2, boundary="balanced")):
+        env.reset(seed=1, options={"site": world})
+        with pytest.raises(ValueError, match="site: deep_boundary_temperature_k: boundary='balanced' finds it"):
+            env.reset(options={"site": {"deep_boundary_temperature_k": 275.0}})
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, "one", True, [1, 2.5], [1, -2]])

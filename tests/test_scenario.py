@@ -78,6 +78,8 @@ def test_a_path_keeps_its_years():
         {name: dict(by_year[name]) for name in COLUMNS},
         {name: list(table[name]) for name in ("year", *COLUMNS)},
         {name: by_year[name] for name in COLUMNS},
+        by_year.set_axis(by_year.index.astype(str)),
+        by_year.rename_axis("Year"),
     ):
         np.testing.assert_array_equal(check_scenario(own).values, expected)
 
@@ -190,7 +192,12 @@ BAD = {
         r"have to follow each other, got 2027 after 2025",
     ),
     "years to come": ({"warming_k": {2030 + k: 1.0 for k in range(60)}}, r"years are 2030 to 2089; 2025 is needed"),
-    "years of text": ({"warming_k": [1.0], "year": ["now"]}, r"its years have to be integers, got \['now'\]"),
+    "years of text": ({"warming_k": [1.0], "year": ["now"]}, r"its years have to be integers, got 'now'"),
+    "index of names": (pd.Series([1.0], ["now"], name="warming_k").to_frame(), r"years have to be integers, got 'now'"),
+    "index of rows with a name": (
+        pd.DataFrame({"warming_k": [1.0]}, pd.Index([0], name="row")),
+        r"its years are 0 to 0; 2025 is needed, too",
+    ),
     "years of another length": ({"warming_k": [1.0] * 4, "year": [2025]}, r"4 values of 1 years; a value each"),
 }
 

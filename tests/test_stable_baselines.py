@@ -16,6 +16,9 @@ def test_it_is_the_lockstep_environment_scalarised():
     same = gym.make_vec("boreal-generalist-v0", num_envs=3, **SHORT)
     with pytest.raises(ValueError, match="seed: an integer .* got -1"):
         envs.seed(-1)
+    envs.set_options({"preferense": 0.5})
+    with pytest.raises(ValueError, match="unknown option 'preferense'; allowed: preference, site"):
+        envs.reset()
     envs.seed(5)
     envs.set_options([{"preference": w} for w in (0.0, 0.25, 1.0)])
     shown = envs.reset()

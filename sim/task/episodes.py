@@ -173,6 +173,10 @@ class Episodes:
     def begin(self, indices, draws, preferences, sites, initial=None) -> None:
         """Start episodes. draws : for each, `draw`'s result; preferences (weights), sites : for each, or None;
         initial : as of `sim.Stands.start`."""
+        for site in sites:
+            # a whole site, as `sim.sample_site` gives one, has the sampled temperature beside its other parameters
+            if self.stands.boundary == "balanced" and BOUNDARY in (site or ()) and len(site) < len(sim.SITE_PARAMETERS):
+                raise ValueError(f"site: {BOUNDARY}: boundary='balanced' finds it; a value of your own is not allowed")
         chosen, seeds, given = [], [], dict(initial or {})
         for k, i in enumerate(indices):
             site_seed, episode_seed, weights = draws[k]

@@ -300,8 +300,8 @@ def in_unit(observations: np.ndarray, name: str, names: Sequence[str] = OBSERVAT
             f"observations: shape (n, {least}) or wider is allowed with these names, got {np.shape(observations)}; the "
             "names of an environment's entries are its observation_names"
         )
-    reader = Reader((name,), names)
-    width = np.shape(observations)[1]
+    reader, observations = Reader((name,), names), np.asarray(observations)
+    width = observations.shape[1]
     if reader.columns[0] >= width:
         raise ValueError(f"observations of {width} entries have no {name!r}, which is entry {reader.columns[0]}")
     return reader(observations)[:, 0]

@@ -7,6 +7,8 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from sim.parameters import check_seed
 
+OPTIONS = ("preference", "site")
+
 
 class LockstepVecEnv(VecEnv):
     """A `BorealVectorEnv` as a VecEnv. Each reward is scalarised by the preference of its stand.
@@ -25,7 +27,9 @@ class LockstepVecEnv(VecEnv):
 
     def reset(self) -> np.ndarray:
         """Start episodes."""
-        options = {name: [one.get(name) for one in self._options] for name in ("preference", "site")}
+        for name in {name for one in self._options for name in one} - set(OPTIONS):
+            raise ValueError(f"unknown option {name!r}; allowed: {', '.join(OPTIONS)}")
+        options = {name: [one.get(name) for one in self._options] for name in OPTIONS}
         observations, _ = self.envs.reset(seed=self._seeds, options=options)
         self._reset_seeds()
         self._reset_options()
