@@ -73,6 +73,17 @@ def test_the_score_of_a_single_training_is_not_shown(results):
     assert "| PPO Gated | 1 |  |  |" in main_points.six_rows(results)
 
 
+def test_more_steps_are_a_row_of_their_own(results):
+    runs = {
+        ("ppo_group", world, "total_timesteps=1000000, vectorization=lockstep"): ["ppo_group"] * 5
+        for world in main_points.WORLDS
+    }
+    results.rows_of_two_objectives().update(runs)
+    assert main_points.six_rows(results).endswith(
+        "\n| Group PPO, 1,000,000 steps | 5 | 110 [105, 115] | 110 [105, 115] |\n"
+    )
+
+
 def test_the_words_follow_from_the_numbers(results):
     plans, ahead, followed = (" ".join(point.split()) for point in main_points.in_words(results).split("\n  - ")[1:])
     assert plans == (
