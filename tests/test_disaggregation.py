@@ -141,8 +141,100 @@ def test_days_in_the_columns_of_a_forcing_are_simulated_as_its_error_advises(dai
             LATITUDE,
             "daily record: wind_speed_m_s has type .*; numbers are allowed",
         ),
+        (
+            lambda daily: daily.drop(daily.loc["2012-05"].index),
+            LATITUDE,
+            r"daily record: no row for 2012-05-01 \(31 days in all\)",
+        ),
+        (
+            lambda daily: daily.tz_localize("Etc/GMT-1"),
+            LATITUDE,
+            "daily record: its dates have the time zone Etc/GMT-1; dates without one are allowed",
+        ),
+        (lambda daily: daily[:0], LATITUDE, "daily record: 0 rows, 29 February apart; one row a day is allowed"),
     ],
 )
 def test_what_is_no_daily_record_is_refused_in_one_line(daily, change, latitude, message):
     with pytest.raises(ValueError, match=f"^{message}$"):
         half_hours(change(daily), latitude)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("air_temperature_c", 273.0, r"\[-75, 50\] degC"),
+        ("vapour_pressure_deficit_hpa", -6.0, r"\[-0.5, 80\] hPa"),
+        ("vapour_pressure_hpa", -6.0, r"\(0, 13.3\] hPa is allowed at 4.3.* degC"),
+        ("vapour_pressure_hpa", 600.0, r"\(0, 13.3\] hPa is allowed at 4.3.* degC"),  # in Pa
+        ("wind_speed_m_s", -3.0, r"\[0, 60\] m s-1"),
+        ("shortwave_w_m2", -50.0, r"\[0, 1500\] W m-2"),
+        ("longwave_w_m2", np.inf, r"\[50, 600\] W m-2"),
+        ("precipitation_mm", -5.0, r"\[0, 200\] mm"),
+    ],
+)
+def test_a_value_beyond_its_limits_is_refused_by_column_and_day(daily, name, value, allowed):
+    changed = daily.assign(vapour_pressure_hpa=0.7 * saturation(daily.air_temperature_c))
+    changed = changed if name == "vapour_pressure_hpa" else changed.drop(columns="vapour_pressure_hpa")
+    changed.loc["2012-05-02", name] = value
+    with pytest.raises(ValueError, match=rf"^daily record: {name} is {value:g} on 2012-05-02; {allowed}"):
+        half_hours(changed, LATITUDE, CYCLE)
+
+
+def test_29_february_may_be_missing_or_wrong_and_vapour_a_little_above_saturation(daily, hours):
+    pd.testing.assert_frame_equal(half_hours(daily.drop(pd.Timestamp("2012-02-29")), LATITUDE, CYCLE), hours)
+    wrong = daily.copy()
+    wrong.loc["2012-02-29", "longwave_w_m2"] = -9999.0
+    pd.testing.assert_frame_equal(half_hours(wrong, LATITUDE, CYCLE), hours)
+    damp = daily.assign(vapour_pressure_hpa=1.09 * saturation(daily.air_temperature_c))  # as at Sodankyla in November
+    assert half_hours(damp, LATITUDE, CYCLE).relative_humidity.max() == 1.0
+
+
+@pytest.mark.parametrize(
+    ("slope", "hour", "message"),
+    [
+        (math.nan, 15.0, r"half_range_per_shortwave = nan: a number in \[0, inf\) is allowed"),
+        (math.inf, 15.0, "half_range_per_shortwave = inf: .*"),
+        (-1.0, 15.0, "half_range_per_shortwave = -1.0: .*"),
+        ("0.01", 15.0, "half_range_per_shortwave = '0.01': .*"),
+        (True, 15.0, "half_range_per_shortwave = True: .*"),
+        (0.01, 40.0, r"peak_hour = 40.0: a number in \[0, 24\) is allowed"),
+        (0.01, 24.0, "peak_hour = 24.0: .*"),
+    ],
+)
+def test_a_cycle_that_is_none_is_refused(slope, hour, message):
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        DiurnalCycle(slope, hour)
+
+
+def test_only_a_cycle_is_a_cycle(daily):
+    with pytest.raises(ValueError, match="^cycle: a sim.DiurnalCycle is allowed, got None$"):
+        half_hours(daily, LATITUDE, None)
+
+
+WHOLE_DAYS = "half-hours of whole days, from 00:00 on, are allowed"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda air, sun: (air.where(air.index != air.index[7]), sun),
+            r"air is missing at 2012-01-01 03:30 \(1 of 17520",
+        ),
+        (lambda air, sun: (air, sun.where(air.index != air.index[7])), "shortwave is missing at 2012-01-01 03:30"),
+        (lambda air, sun: (air, 0.0 * sun), "shortwave: it is 0 in all of 17520 rows; days with light are allowed"),
+        (lambda air, sun: (air[:0], sun[:0]), f"air: 0 rows; {WHOLE_DAYS}"),
+        (lambda air, sun: (sun, air), r"air is [\d.]+ at 2012-.*; \[-75, 50\] degC is allowed"),
+        (lambda air, sun: (air, sun - 1.0), r"shortwave is -1 at 2012-.*; \[0, 1500\] W m-2 is allowed"),
+        (lambda air, sun: (air[::2], sun[::2]), f"air: 8760 rows from 2012-01-01 00:00:00 on; {WHOLE_DAYS}"),
+        (lambda air, sun: (air[:50], sun[:50]), f"air: 50 rows from .*; {WHOLE_DAYS}"),
+        (lambda air, sun: (air[24:-24], sun[24:-24]), f"air: 17472 rows from 2012-01-01 12:00:00 on; {WHOLE_DAYS}"),
+        (lambda air, sun: (air, sun[48:]), "shortwave: 17472 rows; the 17520 times of air are allowed"),
+        (lambda air, sun: (air.tz_localize("UTC"), sun), "air: its times have the time zone UTC; solar time"),
+        (lambda air, sun: (list(air), list(sun)), "air: a Series with a DatetimeIndex is allowed"),
+        (lambda air, sun: (air, sun.astype(str)), "shortwave has type .*; numbers are allowed"),
+    ],
+)
+def test_a_record_that_has_no_cycle_is_refused_by_argument(hours, change, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        diurnal_cycle(*change(hours["air_temperature_c"], hours["shortwave_w_m2"]))

@@ -111,6 +111,108 @@ def test_a_dataset_of_one_place(tmp_path):
         sim.read_forcing(twice, **UTC)
 
 
+def dataset(units, change=None, made=records.fluxnet):
+    """A record as xarray has it, with attributes of units."""
+    xarray = pytest.importorskip("xarray")
+    table = tower(change, made=made).drop(columns="TIMESTAMP_END", errors="ignore")
+    time = table.columns[0]
+    table[time] = pd.to_datetime(table[time].astype(str))
+    whole = xarray.Dataset.from_dataframe(table.set_index(time))
+    for name, unit in units.items():
+        whole[name].attrs["units"] = unit
+    return whole
+
+
+def kelvin(table):
+    return table.assign(TA_F=table.TA_F + KELVIN, TA_ERA=table.TA_ERA + KELVIN)
+
+
+@pytest.mark.parametrize(
+    ("units", "change"),
+    [
+        ({"TA_F": "K", "TA_ERA": "kelvin"}, kelvin),
+        ({"WS_F": "knot"}, lambda t: t.assign(WS_F=t.WS_F * 3600 / 1852)),
+        ({"VPD_F": "kPa", "LW_IN_F": "W/m2"}, lambda t: t.assign(VPD_F=t.VPD_F / 10)),
+        ({"P_F": "kg m-2 s-1"}, lambda t: t.assign(P_F=t.P_F / 1800)),
+        ({"WS_F": "m/s", "TA_F": "celsius", "SW_IN_F": "W m**-2", "LW_IN_F": "W m⁻²", "VPD_F": "mbar"}, None),
+        (
+            {"WS_F": "m s^-1", "TA_F": "degrees_Celsius", "SW_IN_F": "W/m^2", "LW_IN_F": "W.m-2", "P_F": "kg m**-2"},
+            None,
+        ),
+        ({"WS_F": "", "WD": "degree", "NEE_VUT_REF": "umol m-2 s-1"}, None),
+    ],
+)
+def test_the_units_of_a_datasets_own_attributes_are_those_of_its_values(units, change):
+    forcing = sim.read_forcing(dataset(units, change), **SWEDEN)
+    np.testing.assert_allclose(forcing[NAMES], sim.read_forcing(tower(), **SWEDEN)[NAMES], rtol=1e-9, atol=1e-9)
+
+
+def test_the_units_of_era5_land_are_known_and_those_of_the_caller_come_first():
+    units = {"t2m": "K", "d2m": "K", "ssrd": "J m**-2", "strd": "J m**-2", "tp": "m", "u10": "m s**-1", "sp": "Pa"}
+    forcing = sim.read_forcing(dataset(units, made=records.era5_land), **UTC)
+    pd.testing.assert_frame_equal(forcing, sim.read_forcing(records.era5_land(200), **UTC))
+    said = sim.read_forcing(dataset({"TA_F": "K"}), units={"TA_F": "degC"}, **SWEDEN)
+    pd.testing.assert_frame_equal(said, sim.read_forcing(tower(), **SWEDEN))
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        (
+            {"WS_F": "furlong"},
+            "WS_F has the attribute units 'furlong'; allowed for wind_speed: m s-1, .*'WS_F': '..'}$",
+        ),
+        ({"VPD_F": "%"}, "VPD_F has the attribute units '%'; allowed for humidity: hPa, kPa, Pa; if it is wrong, say "),
+    ],
+)
+def test_an_attribute_that_is_no_unit_of_its_column_is_refused(units, message):
+    with pytest.raises(ValueError, match=f"^the dataset: {message}"):
+        sim.read_forcing(dataset(units), **SWEDEN)
+
+
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [
+        ({"latitude": 50.0}, "latitude_deg = 64.256: the dataset is of 50; within 1 degree of it is allowed"),
+        ({"lat": [50.0]}, "latitude_deg = 64.256: the dataset is of 50; .*"),
+        ({"latitude": 64.3, "longitude": 120.0}, "longitude_deg = 19.774: the dataset is of 120; .*"),
+        ({"latitude": 64.3, "longitude": 19.8 + 360.0}, None),
+    ],
+)
+def test_a_dataset_of_another_place_is_refused(place, message):
+    there = dataset({})
+    for name, value in place.items():
+        there = there.expand_dims({name: value}) if isinstance(value, list) else there.assign_coords({name: value})
+    if message is None:
+        assert len(sim.read_forcing(there, **SWEDEN)) == 200 * 48
+    else:
+        with pytest.raises(ValueError, match=f"^{message}$"):
+            sim.read_forcing(there, **SWEDEN)
+
+
+@pytest.mark.parametrize("calendar", ["noleap", "360_day", "standard"])
+def test_calendars_of_climate_models_are_refused_by_name(tmp_path, calendar):
+    xarray = pytest.importorskip("xarray")
+    days = pd.read_csv(records.POKER_FLAT).drop(columns="TIMESTAMP").astype(float)[:365]
+    time = ("time", np.arange(365), {"units": "days since 2011-01-01", "calendar": calendar})
+    xarray.Dataset({name: ("time", days[name]) for name in days}, {"time": time}).to_netcdf(tmp_path / "climate.nc")
+    if calendar == "standard":
+        assert len(sim.read_forcing(tmp_path / "climate.nc", **ALASKA)) == 365 * 48
+    else:
+        message = (
+            f"climate.nc: time is of the calendar '{calendar}'; allowed are standard, gregorian, proleptic_gregorian"
+        )
+        with pytest.raises(ValueError, match=message):
+            sim.read_forcing(tmp_path / "climate.nc", **ALASKA)
+
+
+@pytest.mark.parametrize("name", ["Tair", "TS_F_MDS_1"])
+def test_a_column_of_ones_own_has_its_quality_beside_it(name):
+    table = tower(lambda t: t.rename(columns={"TA_F": name, "TA_F_QC": f"{name}_QC"}))
+    forcing = sim.read_forcing(table, columns={"air_temperature": name}, units={name: "degC"}, **SWEDEN)
+    assert flags(forcing, "air_temperature_c").sum() == 48
+
+
 def test_names_and_units_of_ones_own(weather):
     table = records.icos().rename(columns={"TA": "Tair", "RH": "rh", "TIMESTAMP_START": "begin"})
     table = table.drop(columns="TIMESTAMP_END").assign(Tair=table["Tair"] + 273.15)
@@ -130,6 +232,34 @@ def test_times_with_a_zone_are_converted(weather):
         pd.testing.assert_frame_equal(sim.read_forcing(zoned, **UTC)[NAMES], weather, check_freq=False)
     with pytest.raises(ValueError, match="utc_offset_h: the record's times have a time zone already"):
         sim.read_forcing(table.assign(TIMESTAMP_START=start), **SWEDEN)
+
+
+def days_with(name, times):
+    """The days of Poker Flat with a column of times that is made of their dates."""
+    table = pd.read_csv(records.POKER_FLAT)
+    date = pd.to_datetime(table.pop("TIMESTAMP").astype(str))
+    return table.assign(**{name: times(date)})
+
+
+NEXT = pd.Timedelta(days=1)
+STAMPS = {
+    "ends that are said": ("end", lambda date: (date + NEXT).dt.strftime("%Y-%m-%d"), {"time_end": "end"}),
+    "ends by their name": ("TIMESTAMP_END", lambda date: (date + NEXT).dt.strftime("%Y%m%d%H%M"), None),
+    "24:00": ("TIMESTAMP", lambda date: date.dt.strftime("%Y-%m-%d 24:00"), None),
+    "2400": ("TIMESTAMP", lambda date: date.dt.strftime("%Y%m%d2400"), None),
+    "23:59": ("TIMESTAMP_END", lambda date: date.dt.strftime("%Y-%m-%d 23:59"), None),
+    "noon": ("middle", lambda date: date + NEXT / 2, {"time_middle": "middle"}),
+    "east of Greenwich": ("TIMESTAMP", lambda date: date.dt.tz_localize("Etc/GMT-1"), None),
+    "east of Greenwich, as text": ("TIMESTAMP", lambda date: date.dt.strftime("%Y-%m-%dT00:00:00+01:00"), None),
+    "west of Greenwich": ("TIMESTAMP", lambda date: date.dt.tz_localize("Etc/GMT+9"), None),
+    "with summer time": ("TIMESTAMP", lambda date: date.dt.tz_localize("Europe/Stockholm"), None),
+}
+
+
+@pytest.mark.parametrize(("name", "times", "columns"), STAMPS.values(), ids=STAMPS)
+def test_a_day_keeps_its_date_however_it_is_stamped(name, times, columns):
+    forcing = sim.read_forcing(days_with(name, times), columns=columns, **ALASKA)
+    pd.testing.assert_frame_equal(forcing, sim.read_forcing(records.POKER_FLAT, **ALASKA), check_freq=False)
 
 
 def test_what_solar_time_leaves_of_a_day_repeats_the_day_beside_it(weather):
@@ -417,6 +547,14 @@ BAD = {
     "a time that is none": (
         with_times(lambda t: ["2019-13-45"], [3000]),
         r"row 3000: TIMESTAMP_START is '2019-13-45'; a time as",
+    ),
+    "a time without minutes": (
+        with_times(lambda t: t // 100, range(9600)),
+        r"row 0: TIMESTAMP_START is 2018123123; a time as 201906031230 or 2019-06-03 12:30 is allowed$",
+    ),
+    "a row without minutes": (
+        with_times(lambda t: t // 100, [3000]),
+        r"row 3000: TIMESTAMP_START is 2019030411; a time as",
     ),
     "a time of days first": (
         with_times(lambda t: ["31.12.2019 12:00"], [3000]),
@@ -769,6 +907,10 @@ BAD_FILES = {
     "a row of units": (
         "TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\nyyyy,degC,hPa,m s-1,W m-2,mm\n20190101,1,1,1,10,0\n",
         r"line 2: TIMESTAMP is 'yyyy'; .* is allowed; rows of units below the names have to be removed",
+    ),
+    "a stray quote": (
+        'TIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n20190101,1,1,1,10,0\n"20190102,1,1,1,10,0\n20190103,1,1,1,10,0\n',
+        r"^forcing: tower.csv, line 3: a quote is opened and not closed in its line$",
     ),
     "an empty line": (
         "# tower\nTIMESTAMP,TA_F,VPD_F,WS_F,SW_IN_F,P_F\n20190101,1,1,1,10,0\n\n20190102,1,1,1,10,0\n",

@@ -14,26 +14,31 @@ MOST_MINUTES = 120
 _FORMATS = {8: "%Y%m%d", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
 _DAY_END = re.compile(r"(^\d{8}|[ T])24(:?00(?::?00)?)$")  # 24:00
 _DAY_FIRST = re.compile(r"\d{1,2}[./]\d{1,2}[./]\d{4}")
-_WITH_ZONE = re.compile(r":\d\d(?:\.\d+)?\s?(?:Z|[+-]\d\d(?::?\d\d)?)$")
+_WITH_ZONE = re.compile(r"(:\d\d(?:\.\d+)?)\s?(?:Z|[+-]\d\d(?::?\d\d)?)$")
 
 
-def read_times(table: Table, texts: pd.Series, name: str) -> pd.DatetimeIndex:
-    """The times of a column, one a row. Raises ValueError naming the first row that has none."""
+def read_times(table: Table, texts: pd.Series, name: str, *, zone: bool = True) -> pd.DatetimeIndex:
+    """The times of a column, one a row; without their time zone, as they are written, where `zone` is False. Raises
+    ValueError naming the first row that has none."""
     if pd.api.types.is_datetime64_any_dtype(texts):
-        times = pd.Series(texts)
+        times = pd.Series(texts) if zone else pd.Series(texts).dt.tz_localize(None)
     else:
         text = texts.astype("string").str.strip().str.replace(r"\.0$", "", regex=True)
         given, text = text, text.str.replace(_DAY_END, r"\g<1>00\g<2>", regex=True)
         day_end = (text != given).fillna(False)
         known = text.dropna()
         first = known.iloc[0] if len(known) else ""
+        written = text.str.replace(_WITH_ZONE, r"\g<1>", regex=True)
         if first.isdigit():
-            times = pd.to_datetime(text, format=_FORMATS.get(len(first), "%Y%m%d%H%M"), errors="coerce")
-        elif _WITH_ZONE.search(first):
+            # of fewer digits pandas would take the hour's second digit for the minute
+            length = len(first) if len(first) in _FORMATS else 0
+            whole = text.where((text.str.len() == length).fillna(False))
+            times = pd.to_datetime(whole, format=_FORMATS.get(length), errors="coerce")
+        elif zone and _WITH_ZONE.search(first):
             times = pd.to_datetime(text, format="ISO8601", errors="coerce", utc=True)
         else:
-            without_zone = text.where(~text.str.contains(_WITH_ZONE).fillna(False))
-            times = pd.to_datetime(without_zone, format="ISO8601", errors="coerce")  # no guess of day and month
+            alike = text.where((text == written).fillna(False)) if zone else written
+            times = pd.to_datetime(alike, format="ISO8601", errors="coerce")  # no guess of day and month
         times = times + pd.to_timedelta(day_end.astype(int), unit="D")
     wrong = times.isna().to_numpy()
     if wrong.any():
@@ -59,6 +64,11 @@ def check_ends(table: Table, starts: pd.DatetimeIndex, ends: pd.DatetimeIndex) -
         raise ValueError(
             f"{table.where(row)}: TIMESTAMP_END {_text(ends[row])} is not after TIMESTAMP_START {_text(starts[row])}"
         )
+
+
+def is_daily(times: pd.DatetimeIndex) -> bool:
+    """Whether a row follows the other after a day, for the most part."""
+    return bool(times.to_series().diff().median() == pd.Timedelta(minutes=DAY))
 
 
 def interval_of(table: Table, times: pd.DatetimeIndex) -> int:
@@ -96,10 +106,12 @@ def interval_of(table: Table, times: pd.DatetimeIndex) -> int:
     return int(interval)
 
 
-def kind_of_times(table: Table, choice: Choice, interval: int) -> str:
-    """What the times are, once the interval is known: "start", "end", "middle", "instant" or "day"."""
+def kind_of_times(table: Table, choice: Choice, interval: int, texts: pd.Series) -> str:
+    """What the times are, once the interval is known: "start", "end", "middle", "instant" or "day"; of days only "end"
+    or "day". texts : the times as they are written."""
     if interval == DAY:
-        return "day"
+        first = str(texts.iloc[0]).strip().removesuffix(".0")
+        return "end" if choice.time_kind == "end" or _DAY_END.search(first) else "day"  # 24:00 is of the day it ends
     if choice.time_kind == "day":
         raise ValueError(
             f"{table.name}: whether {choice.time} is an interval's start or its end is not clear; "

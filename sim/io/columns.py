@@ -32,6 +32,23 @@ _UNITS = {
     },
     "air_pressure": _PRESSURE,
 }
+#: Our unit -> how else files' attributes spell it, in small letters, once `_spelled` has written powers as in m-2.
+_SPELLINGS = {
+    "degC": ("c", "degc", "deg c", "degree c", "degrees c", "celsius", "degree celsius", "degrees celsius"),
+    "K": ("k", "kelvin"),
+    "degF": ("f", "degf", "deg f", "fahrenheit", "degrees fahrenheit"),
+    "hPa": ("hpa", "mbar"),
+    "kPa": ("kpa",),
+    "Pa": ("pa",),
+    "%": ("percent",),
+    "1": ("fraction", "dimensionless"),
+    "knot": ("knots", "kt"),
+    "mm": ("kg m-2",),
+    "m": ("m of water equivalent",),
+    "in": ("inch", "inches"),
+    "mm d-1": ("mm day-1", "kg m-2 d-1", "kg m-2 day-1"),
+    "mm h-1": ("mm hr-1", "mm hour-1", "kg m-2 h-1"),
+}
 
 #: Kind -> (our unit, lowest and highest value allowed in it). Shortwave below 0 is a sensor's offset at night.
 LIMITS = {
@@ -177,12 +194,14 @@ class Choice:
     notes: list[str]
 
 
-def choose(record: str, table: list[str], columns: dict | None, units: dict | None, empty) -> Choice:
+def choose(
+    record: str, table: list[str], columns: dict | None, units: dict | None, empty, told: dict[str, str]
+) -> Choice:
     """The columns to use of those that a record has.
 
     record : its name; table : its columns; columns : quantity -> column, in place of what we would take; units :
-    column -> unit; empty : function of a column that says whether it has no number. Raises ValueError naming what is
-    missing, unknown or not clear.
+    column -> unit; empty : function of a column that says whether it has no number; told : column -> unit, as the
+    record's own attributes say, which `units` overrule. Raises ValueError naming what is missing, unknown or not clear.
     """
     columns, units = dict(columns or {}), dict(units or {})
     for quantity, name in columns.items():
@@ -200,8 +219,13 @@ def choose(record: str, table: list[str], columns: dict | None, units: dict | No
         name, empties[quantity] = _pick(record, quantity, names, table, columns, empty)
         if name:
             picked[quantity] = name
-    _check_units(record, picked, units)
-    found = {quantity: _column(quantity, name, table, units) for quantity, name in picked.items()}
+    own = {
+        name: _told_unit(record, quantity, name, told[name])
+        for quantity, name in picked.items()
+        if name in told and name not in units
+    }
+    _check_units(record, picked, own | units)
+    found = {quantity: _column(quantity, name, table, own | units, told) for quantity, name in picked.items()}
     by_parts = "eastward_wind" in found and "northward_wind" in found
     for quantity in NEEDED:
         if quantity not in found and not (quantity == "wind_speed" and by_parts):
@@ -263,6 +287,28 @@ def _unit(quantity: str, name: str, units: dict) -> str | None:
     return units.get(name, names.get(base) if base else None)
 
 
+def _spelled(unit: str) -> str:
+    """A unit as we spell it, where we know it: m/s, m s**-1 and m.s-1 are m s-1."""
+    text = re.sub(r"\*\*|\^", "", unit.translate(str.maketrans("⁻¹²", "-12")).replace("°", "deg"))
+    text = re.sub(r"\s*/\s*([a-zA-Z]+)(\d?)", lambda per: f" {per[1]}-{per[2] or 1}", text)
+    text = " ".join(re.sub(r"[.*·_]", " ", text).split())
+    return next((ours for ours, others in _SPELLINGS.items() if text.lower() in others), text)
+
+
+def _told_unit(record: str, quantity: str, name: str, told: str) -> str:
+    """The unit of a column by the record's own attribute. Raises ValueError for one that is not known, or not of what
+    the column's name says."""
+    unit, by_name = _spelled(told), _unit(quantity, name, {})
+    kinds = [kind for kind in _kinds(quantity) if by_name is None or by_name in _UNITS[kind]]
+    if not any(unit in _UNITS[kind] for kind in kinds):
+        allowed = ", ".join(each for kind in kinds for each in _UNITS[kind])
+        raise ValueError(
+            f"{record}: {name} has the attribute units {told!r}; allowed for {quantity}: {allowed}; "
+            f"if it is wrong, say units={{{name!r}: '..'}}"
+        )
+    return unit
+
+
 def _kinds(quantity: str) -> tuple[str, ...]:
     return ("deficit", "relative_humidity", "dew_point") if quantity == "humidity" else (quantity,)
 
@@ -282,12 +328,12 @@ def _check_units(record: str, picked: dict[str, str], units: dict) -> None:
             raise ValueError(f"units: {name} in {unit!r}; allowed for {quantity}: {allowed[quantity]}")
 
 
-def _column(quantity: str, name: str, table: list[str], units: dict) -> Column:
+def _column(quantity: str, name: str, table: list[str], units: dict, told: dict) -> Column:
     names, unit = NAMES[quantity], str(_unit(quantity, name, units))
     kind = next(kind for kind in _kinds(quantity) if unit in _UNITS[kind])
     quality = f"{name}_QC" if f"{name}_QC" in table else None
     reanalysis = next((n for n in names if n.endswith("_ERA") and n in table and n != name), None)
-    same = reanalysis if reanalysis and names[reanalysis] == unit else None
+    same = reanalysis if reanalysis and _spelled(told.get(reanalysis, names[reanalysis])) == unit else None
     return Column(name, kind, unit, quality, same)
 
 

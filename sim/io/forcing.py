@@ -7,9 +7,19 @@ import pandas as pd
 
 from sim.io import gaps as filling
 from sim.io import reanalysis
-from sim.io.clock import DAY, check_ends, hours_apart, interval_of, kind_of_times, minutes_ahead, noon_of, read_times
+from sim.io.clock import (
+    DAY,
+    check_ends,
+    hours_apart,
+    interval_of,
+    is_daily,
+    kind_of_times,
+    minutes_ahead,
+    noon_of,
+    read_times,
+)
 from sim.io.columns import LIMITS, NAMES, Choice, Column, choose
-from sim.io.disaggregation import FOREST_CYCLE, DiurnalCycle, climate_of, half_hours, saturation_water
+from sim.io.disaggregation import FOREST_CYCLE, DiurnalCycle, climate_of, half_hours, leap_day, saturation_water
 from sim.io.longwave import cloud_cover, longwave
 from sim.io.plausible import FEWEST_DAYS, check_sun, percent, unusual_lines
 from sim.io.table import Table, open_table
@@ -34,6 +44,7 @@ OURS = dict(
 GAPS = ("refuse", "fill")
 UNUSUAL = ("refuse", "take")
 EDGE_HOURS = 12.5
+PLACE_WITHIN_DEG = 1.0  # as `sim.simulate` has it: a cell of a reanalysis is not the site's middle
 #: What is no more than a sum's or a sensor's last digit, and not worth a flag.
 ROUND_OFF = {"shortwave": 0.1, "precipitation": 1e-3}
 
@@ -61,9 +72,10 @@ def read_forcing(
     source : CSV file (also .gz), NetCDF file, DataFrame or xarray Dataset of one place, with the columns of FLUXNET,
         ICOS or AmeriFlux (TA_F, VPD_F, SW_IN_F, ..; -9999 is a gap) or of ERA5-Land (t2m, d2m, ssrd, ..; sums since
         midnight UTC, or of each hour). Daily, or every 120 minutes and oftener. `sim.io.columns.NAMES` has all names.
-    latitude_deg, longitude_deg : of the place; the longitude, east positive, is needed unless the record is daily.
+    latitude_deg, longitude_deg : of the place; the longitude, east positive, is needed unless the record is daily. A
+        record that has its own is refused at another place.
     utc_offset_h : hours that the record's clock is ahead of UTC, without summer time (Sweden 1, Alaska -9); needed for
-        towers, unless they are daily. Times with a time zone are converted by it.
+        towers, unless they are daily. Times with a time zone are converted by it; days keep their dates.
     years : first and last year to use, or one; all by default. The result has whole years of 365 days, from 1 January
         (29 February is dropped), or a part of one year.
     gaps : "refuse" raises at the first; "fill" fills those of up to `longest_gap_days` days and flags them: by the
@@ -72,7 +84,8 @@ def read_forcing(
         temperature, humidity and sunlight.
     columns : names of your own: {"air_temperature": "Tair", "time_start": "begin", ..}. Times are "time_start",
         "time_end" or "time_middle" of their intervals, or the "time" of a reanalysis or a day.
-    units : of columns whose unit is not the usual one, or not known: {"Tair": "K"}.
+    units : of columns whose unit is not the usual one, or not known: {"Tair": "K"}. It overrules the attribute `units`
+        of a NetCDF file's or a Dataset's variable, which overrules the usual one.
     diurnal_cycle : `sim.DiurnalCycle` of temperature, of a daily record.
     unusual : "refuse" raises at what no weather or no sensor gives though each value is within its limits, such as a
         column of another unit or a sensor that stands still (`sim.io.plausible`); "take" takes it, and the report says
@@ -89,20 +102,25 @@ def read_forcing(
     """
     _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_gap_days, diurnal_cycle, unusual)
     table = open_table(source)
+    _check_place(table, latitude_deg, longitude_deg)
     recognised = _recognised(table.columns, columns, units)
     rows = table.read(recognised)
     if recognised and not len(rows):
         raise ValueError(f"{table.name}: 0 rows; whole days at a regular interval are allowed")
-    choice = choose(table.name, table.columns, columns, units, lambda name: _is_empty(rows[name]))
+    choice = choose(table.name, table.columns, columns, units, lambda name: _is_empty(rows[name]), table.units)
     times = read_times(table, rows[choice.time], choice.time)
     if choice.time == "TIMESTAMP_START" and "TIMESTAMP_END" in rows and times.tz is None:
         check_ends(table, times, read_times(table, rows["TIMESTAMP_END"], "TIMESTAMP_END"))
     if times.tz is not None:
         if utc_offset_h is not None:
             raise ValueError("utc_offset_h: the record's times have a time zone already; None is allowed")
-        times, utc_offset_h = times.tz_convert("UTC").tz_localize(None), 0.0
+        dates = read_times(table, rows[choice.time], choice.time, zone=False)
+        if is_daily(dates):  # a day is the date that is written, not Greenwich's
+            times = dates
+        else:
+            times, utc_offset_h = times.tz_convert("UTC").tz_localize(None), 0.0
     interval = interval_of(table, times)
-    kind = kind_of_times(table, choice, interval)
+    kind = kind_of_times(table, choice, interval, rows[choice.time])
     if kind == "middle":
         times = times - pd.Timedelta(minutes=interval / 2)
     _check_grid(table, times, interval, choice.time)
@@ -114,7 +132,8 @@ def read_forcing(
         record, flags, row_of, note = _between_times(table, record, flags, row_of, choice, interval)
         report.append(note)
     elif interval == DAY:
-        record.index = record.index.normalize()
+        # half a day before its end a day has its date, be the end 24:00 or 23:59
+        record.index = (record.index - pd.Timedelta(hours=12 if kind == "end" else 0)).normalize()
     elif kind == "end":
         record.index = record.index - pd.Timedelta(minutes=interval)
     flags.index = row_of.index = record.index
@@ -154,10 +173,10 @@ def read_forcing(
             "half-hours are made of days (`sim.half_hours`): temperature by a cosine, light by the sun's height"
         )
     else:
-        kept = ~_leap_day(record.index)
+        kept = ~leap_day(record.index)
         forcing, flags = record[list(OURS)].rename(columns=OURS)[kept], flags[list(OURS)][kept]
     forcing = forcing.rename_axis("time").join(flags.rename(columns={q: f"{name}_flag" for q, name in OURS.items()}))
-    dropped = int(_leap_day(wanted).sum() * interval // DAY)
+    dropped = int(leap_day(wanted).sum() * interval // DAY)
     report += [f"29 February was dropped in {dropped} year{'s' * (dropped > 1)}"] if dropped else []
     if (days := len(wanted) * interval // DAY) < FEWEST_DAYS:
         report.append(f"{days} days are too few to tell wrong units by: it takes {FEWEST_DAYS}, for rain a year")
@@ -193,6 +212,16 @@ def _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_ga
         raise ValueError(f"unusual {unusual!r}: allowed are {', '.join(UNUSUAL)}")
     if not isinstance(diurnal_cycle, DiurnalCycle):
         raise ValueError(f"diurnal_cycle: a sim.DiurnalCycle is allowed, got {diurnal_cycle!r}")
+
+
+def _check_place(table: Table, latitude_deg: float, longitude_deg: float | None) -> None:
+    """Refuse a place that is not the record's own: the sun has to be that of its place."""
+    for name, given in (("latitude_deg", latitude_deg), ("longitude_deg", longitude_deg)):
+        told = table.place.get(name)
+        if told is not None and given is not None and abs((given - told + 180.0) % 360.0 - 180.0) > PLACE_WITHIN_DEG:
+            raise ValueError(
+                f"{name} = {given:g}: {table.name} is of {told:g}; within {PLACE_WITHIN_DEG:g} degree of it is allowed"
+            )
 
 
 def _check_grid(table: Table, times: pd.DatetimeIndex, interval: int, name: str) -> None:
@@ -236,7 +265,8 @@ def _recognised(names: list[str], columns: dict | None, units: dict | None) -> l
             if not isinstance(name, str):
                 raise ValueError(f"{what}: a text for {key!r} is allowed, got {name!r}")
     known = {name for quantity in NAMES.values() for name in quantity}
-    wanted = {*(columns or {}).values(), "TIMESTAMP_START", "TIMESTAMP_END", "TIMESTAMP"}
+    own = set((columns or {}).values())
+    wanted = own | {f"{name}_QC" for name in own} | {"TIMESTAMP_START", "TIMESTAMP_END", "TIMESTAMP"}
     wanted |= {"valid_time", "time", "date", "Date", "datetime"}
     stems = tuple(f"{name}_" for name in known)
     return [name for name in names if name in wanted or name in known or name.startswith(stems)]
@@ -399,7 +429,7 @@ def _repeat_at_edges(record, flags, row_of, interval: int) -> None:
 def _fill(table, record, flags, row_of, choice: Choice, interval: int, gaps: str, longest_gap_days: float) -> None:
     """Refuse gaps or fill them, in place; longwave of more than three hours is left to `_add_longwave`."""
     per_day = DAY // interval
-    kept = ~_leap_day(record.index)  # a record may lack the day that is dropped anyway
+    kept = ~leap_day(record.index)  # a record may lack the day that is dropped anyway
     for quantity in OURS:
         empty = record[quantity].isna().to_numpy() & kept
         if not empty.any() or (quantity == "longwave" and "longwave" not in choice.columns):
@@ -431,10 +461,6 @@ def _fill(table, record, flags, row_of, choice: Choice, interval: int, gaps: str
 
 def _moment(time, interval: int) -> str:
     return f"{time:%Y-%m-%d}" if interval == DAY else f"{time:%Y-%m-%d %H:%M} solar time"
-
-
-def _leap_day(times: pd.DatetimeIndex) -> np.ndarray:
-    return np.asarray((times.month == 2) & (times.day == 29))
 
 
 def _put(record, flags, quantity: str, values, flag: int) -> None:

@@ -4,7 +4,7 @@ import gzip
 import re
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,8 @@ import pandas as pd
 
 GZIP = b"\x1f\x8b"  # first bytes of what it packs
 NO_NUMBER = -9990.0  # -9999 and its likes stand for what is not there
+CALENDARS = ("standard", "gregorian", "proleptic_gregorian")  # that pandas has
+PLACE = {"latitude_deg": ("latitude", "lat"), "longitude_deg": ("longitude", "lon")}
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,10 @@ class Table:
     read: Callable[[list[str]], pd.DataFrame]
     first_line: int | None = None
     """Line of the file that has the first row; None for a table in memory."""
+    units: dict[str, str] = field(default_factory=dict)
+    """Units of columns by the attribute `units` of a NetCDF file or a Dataset."""
+    place: dict[str, float] = field(default_factory=dict)
+    """Latitude and longitude, as it has them itself."""
 
     def where(self, row: int) -> str:
         """The row, as an error names it."""
@@ -49,7 +55,7 @@ def open_table(source) -> Table:
     if isinstance(source, pd.DataFrame):
         return _in_memory(source, "the table")
     if hasattr(source, "to_dataframe"):
-        return _in_memory(_of_one_place(source, "the dataset"), "the dataset")
+        return _of_one_place(source, "the dataset")
     if not isinstance(source, (str, Path)):
         raise ValueError(f"forcing: a file, a DataFrame or a Dataset is allowed, got {type(source).__name__}")
     path = Path(source)
@@ -60,14 +66,15 @@ def open_table(source) -> Table:
 
         xarray = import_xarray("a NetCDF file")
         try:
-            opened = xarray.open_dataset(path)
+            opened = xarray.open_dataset(path, decode_cf=False)
         except (ValueError, OSError, RuntimeError) as error:
             raise ValueError(
                 f"forcing: {path.name}: no NetCDF file, or netCDF4 or h5netcdf is not installed, which read it"
             ) from error
         try:
             with opened as dataset:
-                return _in_memory(_of_one_place(dataset, path.name), path.name)
+                _check_calendar(dataset, path.name)
+                return _of_one_place(xarray.decode_cf(dataset), path.name)
         except ValueError as error:  # of xarray's own where a file is damaged
             if path.name in str(error):
                 raise
@@ -152,8 +159,9 @@ def _csv(path: Path) -> Table:
 
 
 def _check_fields(path: Path, separator: str, most: int, above: int) -> None:
-    """Refuse a row of more fields than there are names, such as of decimal commas: it would be read shifted. above :
-    lines above the names."""
+    """Refuse a row of more fields than there are names, such as of decimal commas: it would be read shifted; and one
+    of a stray quote, which would take up the rows below. above : lines above the names."""
+    opens = re.compile(rf'(^|{separator})"')
     with gzip.open(path, "rt", encoding="utf-8") if is_packed(path) else path.open(encoding="utf-8") as file:
         for number, line in enumerate(file, start=1):
             fields = line.rstrip(f"{separator}\r\n").count(separator) + 1
@@ -162,6 +170,8 @@ def _check_fields(path: Path, separator: str, most: int, above: int) -> None:
                     f"forcing: {path.name}, line {number}: {fields} fields; the header has {most} names (lines above "
                     "the names have to be removed, or begin with #)"
                 )
+            if number > above and line.count('"') % 2 and opens.search(line):
+                raise ValueError(f"forcing: {path.name}, line {number}: a quote is opened and not closed in its line")
 
 
 def _is_time(name: str) -> bool:
@@ -179,9 +189,30 @@ def _in_memory(frame: pd.DataFrame, name: str) -> Table:
     return Table(name, columns, lambda names: frame.set_axis(columns, axis=1)[names])
 
 
-def _of_one_place(dataset, name: str) -> pd.DataFrame:
-    wide = {dim: size for dim, size in dataset.sizes.items() if size > 1 and "time" not in str(dim)}
+def _of_one_place(dataset, name: str) -> Table:
+    _check_calendar(dataset, name)
+    wide = {dim: size for dim, size in dataset.sizes.items() if size > 1 and not _is_time(str(dim))}
     if wide:
         dim, size = next(iter(wide.items()))
         raise ValueError(f"forcing: {name} has {size} values of {dim}; choose one, such as by .sel or .isel")
-    return dataset.squeeze([dim for dim in dataset.sizes if "time" not in str(dim)], drop=True).to_dataframe()
+    frame = dataset.squeeze([dim for dim in dataset.sizes if not _is_time(str(dim))], drop=True).to_dataframe()
+    variables = {str(column): variable for column, variable in dataset.variables.items()}
+    units = {column: str(variable.attrs.get("units", "")).strip() for column, variable in variables.items()}
+    place = {
+        quantity: float(variables[column].values.item())
+        for quantity, columns in PLACE.items()
+        for column in columns
+        if column in variables and variables[column].size == 1 and variables[column].dtype.kind in "iuf"
+    }
+    return replace(_in_memory(frame, name), units={column: unit for column, unit in units.items() if unit}, place=place)
+
+
+def _check_calendar(dataset, name: str) -> None:
+    """Refuse times of a climate model's calendar, whether xarray has read them yet or not."""
+    for column, variable in dataset.variables.items():
+        calendar = variable.attrs.get("calendar")
+        if variable.dtype.kind == "O" and variable.size:
+            calendar = getattr(variable.values.flat[0], "calendar", calendar)
+        if calendar is not None and str(calendar).lower() not in CALENDARS:
+            allowed = ", ".join(CALENDARS)
+            raise ValueError(f"forcing: {name}: {column} is of the calendar {calendar!r}; allowed are {allowed}")
