@@ -175,6 +175,7 @@ def main(args: Args) -> None:
         sys.exit(f"error: --sites: {error}")
     folder = args.output_dir or paths.studies() / "best_plans"
     paths.make_writable("--output-dir", folder)
+    paths.make_writable("--folder", args.folder)
     physics = open_loop.fingerprint()
     for task in tasks:
         path = folder / f"{task.env_id}.csv"

@@ -13,6 +13,7 @@ import numpy as np
 from PIL import Image
 
 import boreal_env
+from analysis import paths
 from analysis.experiments import BALANCED
 from cleanrl_style import protocol
 from cleanrl_style.protocol import command_line
@@ -45,11 +46,11 @@ def stand() -> Image.Image:
 def main(args: Args) -> None:
     """Draw both."""
     images = args.images
+    paths.make_writable("--images", images)
     try:
         trained = protocol.load_policy(args.policy)
     except (FileNotFoundError, ValueError) as error:
         protocol.fail(f"--policy {error}")
-    images.mkdir(parents=True, exist_ok=True)
     with protocol.replacing(images / "stand.png") as file:
         stand().save(file, format="png")
     generator = np.random.default_rng(SEED)

@@ -59,8 +59,8 @@ def shown(notebook: nbformat.NotebookNode) -> list[str]:
 def main(args: Args) -> None:
     """Run them; write them, or compare."""
     for path in args.notebooks:
-        if not path.is_file():
-            protocol.fail(f"--notebooks {path}: there is no such file")
+        if not path.is_file() or path.suffix != ".ipynb":
+            protocol.fail(f"--notebooks {path}: a file that ends in .ipynb, and is there, is allowed")
     protocol.compile_physics(KERNELS)  # so that no notebook shows that it compiles
     stale = []
     for path in args.notebooks:

@@ -238,6 +238,8 @@ def main(args: Args) -> None:
     try:
         if args.episodes < 1:
             raise ValueError(f"--episodes {args.episodes}: 1 or more are allowed")
+        if not args.runs:
+            raise ValueError("runs: at least one is needed")
         configs = {folder: config_of(folder) for folder in dict.fromkeys(args.runs)}
         tasks = [task_of(config) for config in configs.values()]
         env_ids = sorted({task.env_id for task in tasks})

@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from cleanrl_style.flags import parse
+from cleanrl_style.flags import fail, parse
 
 SCENARIOS = ("ssp126", "ssp245", "ssp585")
 REGIONS = ["WSB", "ESB", "NWN"]
@@ -42,6 +42,7 @@ MIDDLES = (2004.5, 2030.5, 2050.5, 2090.5)
 WORLD = {"ssp126": (0.85, 1.5, 1.7, 1.8), "ssp245": (0.85, 1.5, 2.0, 2.7), "ssp585": (0.85, 1.6, 2.4, 4.4)}
 PRECIPITATION_PER_DEGREE = 0.04
 WARMEST_DAY = 198
+CARBON_DIOXIDE = "Atmospheric Concentrations|CO2"
 FILE = Path(__file__).resolve().parent.parent / "sim" / "scenarios.csv"
 SOURCE = """\
 # Boreal land by scenario and year, against 1995-2014: warming [K], half-range over the year of that warming [K, below 0
@@ -59,6 +60,18 @@ class Args:
     """folder of CMIP6_<model>_<experiment>_<run>.csv"""
     concentrations: Path
     """csv of yearly concentrations by Scenario, Region and Variable"""
+
+
+def concentrations(path: Path) -> pd.DataFrame:
+    """The world's carbon dioxide by scenario; ends the command with one line for a file that is no such table."""
+    try:
+        table = pd.read_csv(path)
+    except (ValueError, OSError) as error:
+        fail(f"--concentrations {path}: {' '.join(str(error).split())}")
+    lacking = [name for name in ("Scenario", "Region", "Variable", *YEARS.astype(str)) if name not in table]
+    if lacking:
+        fail(f"--concentrations {path}: it has no column {lacking[0]}")
+    return table[(table.Region == "World") & (table.Variable == CARBON_DIOXIDE)].set_index("Scenario")
 
 
 def monthly_means(path: Path, years: tuple[int, int]) -> pd.DataFrame | None:
@@ -104,10 +117,11 @@ def world_warming(scenario: str) -> np.ndarray:
 
 def main(args: Args) -> None:
     """Write the table, and print what it follows from."""
+    ppm = concentrations(args.concentrations)
+    if not any(args.atlas.glob("CMIP6_*_historical_*.csv")):
+        fail(f"--atlas {args.atlas}: a folder with CMIP6_<model>_historical_<run>.csv is allowed")
     factors = amplification(args.atlas)
     print(factors.round(3).to_string())
-    ppm = pd.read_csv(args.concentrations)
-    ppm = ppm[(ppm.Region == "World") & (ppm.Variable == "Atmospheric Concentrations|CO2")].set_index("Scenario")
     tables = []
     for scenario in SCENARIOS:
         warming = factors.boreal[scenario] * world_warming(scenario)

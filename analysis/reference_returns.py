@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from analysis import paths
 from analysis.studies.constant_plans import ENVIRONMENTS
 from baselines_heuristic import conifer_restoration, obeying, random_valid, target_density
 from cleanrl_style import protocol
@@ -52,6 +53,7 @@ def main(args: Args) -> None:
     if args.episodes is not None and not 1 <= args.episodes <= len(test):
         protocol.fail(f"--episodes {args.episodes}: 1 to {len(test)} are allowed")
     test = test[: args.episodes]
+    paths.make_writable("--folder", args.folder)
     validation = list(sites.published_seeds("validation"))[: course.STANDS]  # of a training's course
     for env_id in ENVIRONMENTS:
         task, path = protocol.Task.of(env_id), args.folder / f"{env_id}.csv.gz"

@@ -13,12 +13,17 @@ import numpy as np
 import pandas as pd
 
 from analysis import paths, reduction
-from cleanrl_style.protocol import fronts
+from cleanrl_style.protocol import files, fronts
 from cleanrl_style.protocol.reference import physics_name
 
 SITE_SPECIFIC = "site-specific"  # the mode in which all episodes are of one site and weather
 ARCHIVED = "tables.zip"  # the reduced tables of an archived run
 NAMES_IN_TABLES = ("policy", "variable", "phase")  # columns of a run's tables that are no numbers
+
+# What a run's config.json has in any case, and its arguments.
+OF_CONFIG = {"script": str, "not_default": dict, "arguments": dict}
+OF_ARGUMENTS = {"env_id": str, "mode": str, "seed": int, "eval_weights": list, "eval_episodes": int}
+OF_ARGUMENTS |= {"thaw_formulation": str, "site_seed": int | None}
 
 # Arguments that do not make another row: what tells its runs apart, what the row has a column for, and the output.
 NOT_A_SETTING = ("seed", "site_seed", "preference", "mode", "env_id", "run_dir", "overwrite")
@@ -129,6 +134,8 @@ def read_table(path: Path) -> pd.DataFrame:
         table = pd.read_csv(path)
     except (ValueError, OSError) as error:
         raise ValueError(f"damaged: {path.name} ({in_a_line(error)})") from error
+    if files.is_cut(path):
+        raise ValueError(f"damaged: {path.name} does not end with a newline")
     for name in table.columns.difference(NAMES_IN_TABLES, sort=False):
         wrong = table[name].notna() & pd.to_numeric(table[name], errors="coerce").isna()
         if wrong.any():
@@ -146,12 +153,18 @@ def read_config(folder: Path) -> dict:
     """A run's configuration; ValueError if it cannot be used."""
     try:
         config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
-        config["script"], config["not_default"]
-        for name in ("env_id", "mode", "seed", "eval_weights", "eval_episodes", "thaw_formulation", "site_seed"):
-            config["arguments"][name]
+        check_kinds(config, OF_CONFIG)
+        check_kinds(config["arguments"], OF_ARGUMENTS)
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"damaged: config.json ({error!r})") from error
     return config
+
+
+def check_kinds(values: dict, kinds: dict) -> None:
+    """KeyError or TypeError for the first value that is not there, or of another kind."""
+    for name, kind in kinds.items():
+        if not isinstance(values[name], kind):
+            raise TypeError(f"{name} is {values[name]!r}")
 
 
 def read_run(folder: Path) -> Run:

@@ -85,7 +85,7 @@ import pandas as pd
 from analysis import runs
 from analysis.excerpts import markdown
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts, reference, score
+from cleanrl_style.protocol import files, fronts, reference, score
 from cleanrl_style.protocol.arguments import ask
 from cleanrl_style.protocol.summary import followed
 
@@ -101,6 +101,13 @@ def evaluation_of(folder: Path) -> pd.DataFrame:
         runs.check(written, config)
         if "episode" not in written or not pd.api.types.is_numeric_dtype(written.episode):
             raise ValueError("damaged: evaluation.csv lacks the column episode, of numbers")
+        weights = fronts.weight_columns(fronts.objectives_of(written.columns))
+        in_turn = written.sort_values("episode").groupby(["policy", *weights]).cumcount().sort_index()
+        wrong = written.episode != in_turn
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            value = f"episode is {written.episode[row]}, not {in_turn[row]}"
+            raise ValueError(f"damaged: evaluation.csv, line {row + 2}: {value}")
     except ValueError as error:
         raise ValueError(f"{folder}: {error}") from error
     return written
@@ -142,18 +149,35 @@ def comparison(policy: protocol.Policy, task: protocol.Task, episodes: int) -> s
     return score.Comparison(evaluation, plans)
 
 
+def leaderboard(root: Path) -> pd.DataFrame:
+    """The leaderboard's rows; ValueError says what of the table is damaged."""
+    path = root / TABLE
+    if not path.exists():
+        return pd.DataFrame(columns=COLUMNS)
+    try:
+        table = pd.read_csv(path)
+    except ValueError as error:
+        raise ValueError(f"{path} is damaged ({runs.in_a_line(error)})") from error
+    if tuple(table) != COLUMNS:
+        raise ValueError(f"{path} is damaged: its columns have to be {', '.join(map(repr, COLUMNS))}")
+    unscored = table.name[table[list(SCORES)].apply(pd.to_numeric, errors="coerce").isna().any(axis=1)]
+    if len(unscored):
+        raise ValueError(f"{path} is damaged: its row {unscored.iloc[0]!r} lacks a score")
+    if files.is_cut(path):
+        raise ValueError(f"{path} is damaged: it does not end with a newline")
+    return table
+
+
 def check_name(name: str, args: Args) -> None:
-    """ValueError if the leaderboard has a row of that name already, which is not to be replaced."""
-    table = args.root / TABLE
-    if args.add and not args.replace and table.exists() and name in set(pd.read_csv(table).name):
+    """ValueError if the leaderboard is damaged, or has a row of that name already, which is not to be replaced."""
+    if args.add and name in set(leaderboard(args.root).name) and not args.replace:
         raise ValueError(f"--name {name!r}: {TABLE} has a row of that name; --replace puts this one in its place")
 
 
 def add(row: dict, root: Path) -> None:
     """Put a row into the leaderboard's table and page, the best on the balanced task first."""
-    table = pd.DataFrame([row], columns=COLUMNS)
-    if (root / TABLE).exists():
-        there = pd.read_csv(root / TABLE)
+    table, there = pd.DataFrame([row], columns=COLUMNS), leaderboard(root)
+    if len(there):
         table = pd.concat([there[there.name != row["name"]], table], ignore_index=True)
     table = table.sort_values([f"greedy, {TASKS[1]}", "name"], ascending=[False, True])
     page = (root / PAGE).read_text(encoding="utf-8")

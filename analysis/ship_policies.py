@@ -17,6 +17,7 @@ flags.require("tyro")
 
 import tyro
 
+from analysis import paths
 from cleanrl_style import protocol
 
 LARGEST = 100_000  # bytes
@@ -44,6 +45,7 @@ def main(args: Args) -> None:
 
     if not args.runs:
         sys.exit("error: runs: at least one is needed")
+    paths.make_writable("--folder", args.folder)
     packed = {}
     for path in args.runs:
         try:
@@ -61,7 +63,6 @@ def main(args: Args) -> None:
         if name in packed:
             sys.exit(f"error: {path}: two policies of the name {name}")
         packed[name] = buffer.getvalue()
-    args.folder.mkdir(parents=True, exist_ok=True)
     for name, content in packed.items():
         with protocol.replacing(args.folder / f"{name}.pt") as file:
             file.write(content)

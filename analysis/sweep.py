@@ -99,7 +99,12 @@ def arguments_of(script: Path) -> type:
         protocol.fail(f"{script}: no script there, a file that ends in .py")
     spec = importlib.util.spec_from_file_location(script.stem, script)
     module = sys.modules[script.stem] = importlib.util.module_from_spec(spec)  # where its help texts are looked for
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except SyntaxError as error:
+        protocol.fail(f"script {error.filename}, line {error.lineno}: {error.msg}")
+    except ImportError as error:
+        protocol.fail(f"script {script}: {error}")
     if not hasattr(module, "Args"):
         protocol.fail(f"{script}: no class Args, which the arguments of a training script are")
     return module.Args
@@ -193,17 +198,19 @@ def main(args: Args) -> None:
     """Run what is not finished, and make the table when all is."""
     found = all_runs(args)
     mine = part_of(found, args.part)
-    if args.list:
-        print("\n".join(str(run.command) for run in mine))
-        return
     if args.output.is_dir():
         protocol.fail(f"--output {args.output}: the name of a file is allowed")
     paths.make_writable("--output", args.output.parent)
     paths.make_writable("--runs-dir", args.runs_dir)
+    if not re.fullmatch(rf"{HERE}|{RAY_HERE}|auto|\S+:\S+", args.address):
+        protocol.fail(f"--address {args.address!r}: {HERE}, {RAY_HERE}, auto or host:port is allowed")
     try:
         check_address(args.address)
     except NoCluster as error:
         protocol.fail(f"--{error}")
+    if args.list:
+        print("\n".join(str(run.command) for run in mine))
+        return
     waiting = [run for run in mine if not run.finished]
     where = {HERE: "processes of this machine", RAY_HERE: "Ray on this machine"}.get(
         args.address, f"the Ray cluster at {args.address}"

@@ -38,7 +38,7 @@ def test_the_agent_of_a_script_elsewhere(tmp_path):
     path = tmp_path / "ppo_own.py"
     path.write_text((ROOT / "cleanrl_style" / "ppo_gated.py").read_text())
     train(path, tmp_path / "run")
-    with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_own.py; .*script=path"):
+    with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_own.py to import; script=path"):
         protocol.load_policy(tmp_path / "run")
     evaluate_again(tmp_path / "run", protocol.load_policy(tmp_path / "run", script=path))
 
@@ -76,6 +76,20 @@ def test_returns_of_another_number_of_objectives_are_refused():
         policy.act(np.zeros(105), np.ones(25, bool), [0.0, 0.0, 0.0])
     with pytest.raises(ValueError, match="eupg_var_lambda: accrued_returns are not finite"):
         policy.act(np.zeros(105), np.ones(25, bool), [np.nan, 0.0])
+    with pytest.raises(ValueError, match="eupg_var_lambda: accrued_returns are not finite numbers"):
+        policy.act(np.zeros(105), np.ones(25, bool), ["much", "more"])
+    for without in (policy.act, lambda *given: policy(*given, None)):
+        with pytest.raises(ValueError, match="eupg_var_lambda looks at the returns .*: give accrued_returns"):
+            without(np.zeros((1, 105), np.float32), np.ones((1, 25), bool))
+
+
+def test_a_script_with_a_dot_in_its_name_is_named(tmp_path):
+    saved = torch.load(policy_file("ppo_gated"), weights_only=True)
+    saved["run"]["script"] = "ppo_v1.2"
+    torch.save(saved, tmp_path / "policy.pt")
+    with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_v1.2.py to import; script=path, .*--script"):
+        protocol.load_policy(tmp_path)
+    assert protocol.load_policy(tmp_path, ROOT / "cleanrl_style" / "ppo_gated.py").script == "ppo_v1.2"
 
 
 def test_a_policy_whose_training_went_wrong_is_refused(tmp_path):

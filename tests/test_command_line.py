@@ -16,7 +16,7 @@ from PIL import Image
 from scripts import ROOT, run_script
 
 import boreal_env
-from analysis import score_policy, ship_policies
+from analysis import best_plans, choose_sites, draw_readme, reference_returns, score_policy, ship_policies
 from cleanrl_style import flags, protocol
 from cleanrl_style.protocol import command_line, run_folder
 
@@ -135,6 +135,8 @@ def test_an_environment_that_draws_nothing_cannot_be_watched(run, monkeypatch):
         (["watch", "{run}", "--preference", "2"], r"--preference: a number in \[0, 1\] is allowed, got 2.0"),
         (["watch", "{run}", "--env-id", "boreal-balanced-v0"], "observes 43 entries, boreal-balanced-v0 has 105"),
         (["watch", "{run}", "--env-id", "boral-v0"], "boral"),
+        (["watch", "{run}", "--env-id", "./pond.py:pond-v0"], "a module is allowed, such as pond:pond-v0, with PYTHON"),
+        (["watch", "{run}", "--env-id", "pond.py:pond-v0"], "a module is allowed, such as pond:pond-v0, with PYTHON"),
         (["watch", "{run}", "--out", "/nowhere/years.gif"], "--out /nowhere/years.gif: there is no folder /nowhere"),
         (["watch", "{run}", "--out", "/proc/years.gif"], "--out /proc/years.gif: (cannot write|there is no folder)"),
         (["watch", "{run}", "--window"], "--window: matplotlib finds no display here; without it a GIF is written"),
@@ -160,24 +162,43 @@ def test_a_bad_command_gets_one_line(run, given, message, monkeypatch):
         ("evaluation.csv", lambda data: b""),
         ("evaluation.csv", lambda data: data[:-3]),
         ("evaluation.csv", lambda data: data[: data[:-1].rindex(b"\n") + 1]),
+        ("evaluation.csv", lambda data: data[: data.rindex(b",") + 1] + b"nan\n"),
         ("episodes.csv", lambda data: data[:100]),
         ("policy.pt", lambda data: data[: len(data) // 2]),
+        ("policy.pt", lambda data: None),
     ],
-    ids=["empty", "cut in a number", "cut after a row", "half a log", "half a policy"],
+    ids=["empty", "cut in a number", "cut after a row", "no number", "half a log", "half a policy", "no policy"],
 )
 def test_a_finished_run_that_is_damaged_is_not_called_finished(run, tmp_path, name, harm):
     folder = tmp_path / "run"
     shutil.copytree(run, folder)
     assert run_folder.damage_of(folder, 5) is None
-    (folder / name).write_bytes(harm((folder / name).read_bytes()))
+    harmed = harm((folder / name).read_bytes())
+    (folder / name).unlink()
+    if harmed is not None:
+        (folder / name).write_bytes(harmed)
     assert run_folder.damage_of(folder, 5) == name
 
 
-def test_a_script_with_a_syntax_error_is_named_by_its_line(run, tmp_path):
-    script = tmp_path / "syn.py"
-    script.write_text("import torch\n\nclass Agent(:\n    pass\n")
-    with pytest.raises(SystemExit, match=rf"^error: script {script}, line 3: invalid syntax$"):
+def test_what_trains_without_a_checkpoint_is_finished_without_a_policy(run, tmp_path):
+    shutil.copytree(run, tmp_path / "run", ignore=shutil.ignore_patterns("*.pt"))
+    assert run_folder.damage_of(tmp_path / "run", 5) is None
+
+
+@pytest.mark.parametrize(
+    "text, what",
+    [
+        ("import torch\n\nclass Agent(:\n    pass\n", ", line 3: invalid syntax"),
+        ("import nowhere_to_be_found\n", ": No module named 'nowhere_to_be_found'"),
+    ],
+)
+def test_a_script_that_cannot_be_loaded_is_named(run, tmp_path, text, what):
+    script = tmp_path / "own.py"
+    script.write_text(text)
+    with pytest.raises(SystemExit, match=rf"^error: script {script}{what}$"):
         command_line.main(["watch", str(run), "--script", str(script)])
+    with pytest.raises(SystemExit, match=rf"^error: script {script}{what}$"):
+        score_policy.main(score_policy.Args(run, script, tasks=("boreal-site-specific-v0",)))
 
 
 def test_a_run_is_checked_and_scored(run, capsys):
@@ -214,7 +235,8 @@ def test_a_policy_that_does_not_play_its_evaluation_is_refused(run, tmp_path):
         ("config.json", "", r"damaged: config.json \("),
         ("config.json", "{}", r"damaged: config.json \(KeyError\('script'\)\)$"),
         ("evaluation.csv", "", r"damaged: evaluation.csv \(No columns to parse from file\)$"),
-        ("evaluation.csv", "HEADER", "damaged: evaluation.csv has 0 episodes of the greedy policy, not 5$"),
+        ("evaluation.csv", "HEADER\ngreedy,0", "damaged: evaluation.csv does not end with a newline$"),
+        ("evaluation.csv", "HEADER\n", "damaged: evaluation.csv has 0 episodes of the greedy policy, not 5$"),
         ("evaluation.csv", "a,b\n1,2\n", "damaged: evaluation.csv with the returns of .* lacks the column policy$"),
         ("evaluation.csv", "a\n1,2\n1,2,3\n", r"damaged: evaluation.csv \(Error tokenizing"),
     ],
@@ -234,6 +256,23 @@ def test_a_damaged_file_of_a_submitted_run_is_named(run, tmp_path, name, text, m
 
 
 @pytest.mark.parametrize(
+    "change, message",
+    [
+        (lambda episode: episode + 8, "line 2: episode is 8, not 0"),
+        (lambda episode: episode * 0 - 1, "line 2: episode is -1, not 0"),
+        (lambda episode: episode.where(episode.index > 2), "line 2: episode is nan, not 0.*"),
+    ],
+)
+def test_episodes_of_other_numbers_are_refused(run, tmp_path, change, message):
+    shutil.copytree(run, tmp_path / "run")
+    path = tmp_path / "run" / "evaluation.csv"
+    table = pd.read_csv(path)
+    table.assign(episode=change(table.episode)).to_csv(path, index=False)
+    with pytest.raises(ValueError, match=f"^{path.parent}: damaged: evaluation.csv, {message}$"):
+        score_policy.evaluation_of(path.parent)
+
+
+@pytest.mark.parametrize(
     "given, message",
     [
         (("nobody",), "nobody: neither the folder of a finished run"),
@@ -244,6 +283,7 @@ def test_a_damaged_file_of_a_submitted_run_is_named(run, tmp_path, name, text, m
         (("ppo_group", "--name", "mine"), "--name goes with --add"),
         (("ppo_group", "--script", "nowhere.py"), "--script nowhere.py: a file that ends in .py, and is there"),
         (("ppo_group", "--tasks", "boral-v0"), "--tasks boral-v0: Environment `boral` doesn't exist"),
+        (("ppo_group", "--tasks", "./pond.py:pond-v0"), "--tasks ./pond.py:pond-v0: a module is allowed"),
     ],
 )
 def test_a_policy_is_scored_with_good_flags_alone(given, message):
@@ -276,3 +316,43 @@ def test_rows_go_into_the_leaderboard(tmp_path):
         score_policy.check_name("one", args)
     score_policy.check_name("three", args)
     score_policy.check_name("one", replace(args, replace=True))
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (lambda text: text[:-20], "its row 'Group PPO, balanced task' lacks a score"),
+        (lambda text: text[:-1], "it does not end with a newline"),
+        (lambda text: text.replace(",", ";"), "its columns have to be 'name', 'script', .*"),
+        (lambda text: "", r"\(No columns to parse from file\)"),
+    ],
+    ids=["cut in a row", "cut", "semicolons", "empty"],
+)
+def test_a_damaged_leaderboard_is_left_as_it_is(change, message, tmp_path):
+    (tmp_path / "docs").mkdir()
+    path = tmp_path / score_policy.TABLE
+    path.write_text(change((ROOT / score_policy.TABLE).read_text(encoding="utf-8")), encoding="utf-8")
+    damaged, args = path.read_bytes(), score_policy.Args(Path("ppo_group"), add=True, replace=True, root=tmp_path)
+    for refused in (lambda: score_policy.check_name("one", args), lambda: score_policy.add({"name": "one"}, tmp_path)):
+        with pytest.raises(ValueError, match=rf"^{path} is damaged:? {message}$"):
+            refused()
+    assert path.read_bytes() == damaged
+
+
+@pytest.mark.parametrize(
+    "command, given",
+    [
+        (best_plans, {"folder": "file"}),
+        (choose_sites, {"path": "file/sites.csv"}),
+        (draw_readme, {"images": "file"}),
+        (reference_returns, {"folder": "file"}),
+        (ship_policies, {"runs": ("ppo_group",), "folder": "file"}),
+    ],
+    ids=lambda part: part.__name__ if hasattr(part, "__name__") else "",
+)
+def test_where_nothing_can_be_written_nothing_is_computed(command, given, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("file").touch()
+    given = {name: Path(value) if isinstance(value, str) else value for name, value in given.items()}
+    with pytest.raises(SystemExit, match=r"^error: --\w+ file: cannot write there \(File exists\)$"):
+        command.main(command.Args(**given))

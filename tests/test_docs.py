@@ -128,6 +128,14 @@ def test_the_site_builds_without_a_warning(tmp_path):
         assert f'id="{name}"' in names
 
 
+def test_what_is_no_notebook_is_refused():
+    pytest.importorskip("nbclient")
+    from analysis import execute_notebooks
+
+    with pytest.raises(SystemExit, match="^error: --notebooks .*README.md: a file that ends in .ipynb, and is there"):
+        execute_notebooks.main(execute_notebooks.Args(notebooks=(ROOT / "README.md",)))
+
+
 @pytest.mark.parametrize("path", sorted(ROOT.glob("docs/notebooks/*.ipynb")), ids=lambda path: path.stem)
 def test_notebooks_are_current(path):
     pytest.importorskip("nbclient")

@@ -237,6 +237,8 @@ def test_a_split_or_a_run_that_is_not_there(run, tmp_path):
         generalisation.main(generalisation.Args(runs=(folder,), episodes=3))
     with pytest.raises(SystemExit, match="--episodes 0: 1 or more are allowed"):
         generalisation.main(generalisation.Args(runs=(folder,), episodes=0))
+    with pytest.raises(SystemExit, match="^error: runs: at least one is needed$"):
+        generalisation.main(generalisation.Args(runs=()))
     with pytest.raises(SystemExit, match="nowhere: no folder of a run"):
         judge(tmp_path / "nowhere")
     (tmp_path / "config.json").write_text("{")

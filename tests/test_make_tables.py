@@ -268,7 +268,7 @@ def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):
 def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
     runs = tmp_path / "runs"
     names = ("good", "unfinished", "config", "truncated", "columns", "infinite", "partial", "broken-years", "twin")
-    for name in (*names, "without-any-steps", "text-for-numbers"):
+    for name in (*names, "without-any-steps", "text-for-numbers", "half-a-line", "no-settings"):
         write_run(runs / name, "ppo_curriculum", seed=1 if name == "twin" else len(name) + 20)
     write_run(runs / "zz-first", "ppo_curriculum", seed=1)
     (runs / "unfinished" / "evaluation.csv").unlink()
@@ -286,10 +286,13 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
     file = runs / "text-for-numbers" / "episodes.csv"
     file.write_text(re.sub(r"^\d+,", "x,", file.read_text(), count=2, flags=re.M))
     (runs / "broken-years" / "evaluation_years.csv").write_bytes(b"")
+    (runs / "half-a-line" / "timing.csv").write_text("phase,glo")
+    file = runs / "no-settings" / "config.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"not_default": []}))
     table = make(runs, tmp_path / "tables")
     assert table.loc[("ppo_curriculum", "boreal-generalist-v0", "default")].seeds == 2
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 10
+    assert len(lines) == 12
     for name, reason in [
         ("unfinished", "no evaluation.csv"),
         ("config", "config.json"),
@@ -300,6 +303,8 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
         ("without-any-steps", "damaged: a table lacks a column"),
         ("text-for-numbers", "damaged: episodes.csv, line 2: global_step is 'x', not a number"),
         ("broken-years", "damaged: evaluation_years.csv"),
+        ("half-a-line", "damaged: timing.csv does not end with a newline"),
+        ("no-settings", "damaged: config.json (TypeError('not_default is []'))"),
         ("zz-first", "the same run as"),
     ]:
         assert sum(str(runs / name) + ":" in line and reason in line for line in lines) == 1, name

@@ -172,6 +172,18 @@ def test_another_simulation_is_not_gone_on_with(tmp_path):
         sim.simulate_many(sites, path=tmp_path / "other", years=1, **COARSE)
 
 
+@pytest.mark.parametrize("name", ["latitude_deg/c/0", "biomass_kgc_m2/c/0/0", "biomass_kgc_m2/zarr.json"])
+def test_a_store_that_is_cut_is_named(name, tmp_path):
+    path = tmp_path / "region.zarr"
+    sim.simulate_many(table(2), path=path, years=1, **COARSE)
+    data = (path / name).read_bytes()
+    (path / name).write_bytes(data[: len(data) // 2])
+    with pytest.raises(ValueError, match=rf"^{path} is damaged \(.*\); overwrite=True starts over"):
+        sim.simulate_many(table(2), path=path, years=1, **COARSE)
+    sim.simulate_many(table(2), path=path, years=1, overwrite=True, **COARSE)
+    assert (path / name).read_bytes() == data
+
+
 def test_chunks_are_of_one_size_and_bounded():
     assert many.chunk_size(100_000, 50) <= 1024 and many.chunk_size(20_000, 2) <= many.LARGEST_CHUNK
     assert many.chunk_size(5, 50) == 5 and many.chunk_size(1025, 50) == 513 and many.chunk_size(100, 1000) <= 51
@@ -251,6 +263,8 @@ def test_rows_are_named_as_the_table_names_them():
         (table(2), {"threads": 0}, "threads: a positive integer is allowed, got 0"),
         (table(2), {"preference": 2.0}, "preference"),
         (table(2), {"seed": -1}, "seed"),
+        (table(2), {"overwrite": "no"}, "overwrite: True or False is allowed, got 'no'"),
+        (table(2), {"progress": "no"}, "progress: True or False is allowed, got 'no'"),
     ],
 )
 def test_bad_arguments(sites, arguments, message):

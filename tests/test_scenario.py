@@ -58,6 +58,26 @@ def test_the_document_has_the_ratios_of_the_table():
     assert "(medians: {}, {} and {}; $w_A = {}$, ${}$ and ${}\\,w$".format(*ratios, *amplitudes) in text
 
 
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        (None, "--concentrations .*ppm.csv: .*No such file"),
+        ("", "--concentrations .*ppm.csv: No columns to parse from file"),
+        ("Scenario,Variable\n", "--concentrations .*ppm.csv: it has no column Region"),
+        (
+            f"Scenario,Region,Variable,{','.join(map(str, range(2015, 2101)))}\n",
+            "--atlas .*nowhere: a folder with CMIP6_",
+        ),
+    ],
+)
+def test_paths_are_made_of_what_is_there(text, message, tmp_path):
+    ppm = tmp_path / "ppm.csv"
+    if text is not None:
+        ppm.write_text(text)
+    with pytest.raises(SystemExit, match=f"^error: {message}"):
+        make_scenarios.main(make_scenarios.Args(tmp_path / "nowhere", ppm))
+
+
 def test_a_stand_starts_in_the_first_year_of_a_path():
     table = PATHS["ssp585"].set_index("year")
     by_hand = {name: dict(table[name].loc[FIRST_YEAR : FIRST_YEAR + 2]) for name in COLUMNS}

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -100,11 +101,34 @@ def test_a_slurm_array_is_its_parts(tmp_path):
         ({"script": ROOT / "README.md"}, "README.md: no script there, a file that ends in .py"),
         ({"grid": ["learning_rate=1e-4,0.0001"]}, "two of its combinations are the same run"),
         ({"part": "4/3"}, "--part 4/3"),
+        ({"grid": ["env_id=./pond.py:pond-v0"]}, "--env-id ./pond.py:pond-v0: a module is allowed"),
     ],
 )
 def test_bad_arguments(changes, message, tmp_path):
     with pytest.raises(SystemExit, match=message):
         sweep.main(args(tmp_path, **changes))
+
+
+def test_a_script_whose_import_is_missing_is_named(tmp_path):
+    script = tmp_path / "own.py"
+    script.write_text("import nowhere_to_be_found\n")
+    with pytest.raises(SystemExit, match=f"^error: script {script}: No module named 'nowhere_to_be_found'$"):
+        sweep.main(args(tmp_path, script=script))
+
+
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        ({"address": "foo"}, "--address 'foo': none, local, auto or host:port is allowed"),
+        ({"address": ""}, "--address '': none"),
+        ({"runs_dir": SCRIPT}, "--runs-dir .*: cannot write there"),
+        ({"output": ROOT}, "--output .*: the name of a file is allowed"),
+    ],
+)
+def test_commands_that_cannot_run_are_not_listed(changes, message, tmp_path, capsys):
+    with pytest.raises(SystemExit, match=f"^error: {message}"):
+        sweep.main(replace(args(tmp_path, list=True), **changes))
+    assert capsys.readouterr().out == ""
 
 
 def test_one_command_trains_all(tmp_path, monkeypatch):

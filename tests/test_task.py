@@ -157,7 +157,20 @@ class DeafEnvs(ToyVectorEnv):
         return super().reset(seed=seed)
 
 
-@pytest.mark.parametrize("envs, what", [(NextStepEnvs, "SAME_STEP"), (DeafEnvs, "each its own of reset")])
+class SummedEnvs(ToyVectorEnv):
+    def step(self, actions):
+        observations, rewards, *rest = super().step(actions)
+        return observations, rewards.sum(axis=1), *rest
+
+
+@pytest.mark.parametrize(
+    "envs, what",
+    [
+        (NextStepEnvs, "SAME_STEP"),
+        (DeafEnvs, "each its own of reset"),
+        (SummedEnvs, r"rewards of shape \(2, 2\), not \["),
+    ],
+)
 def test_a_vector_environment_that_is_otherwise_than_ours_is_refused(envs, what):
     gym.register("otherwise-v0", entry_point=ToyEnv, vector_entry_point=envs)
     try:
@@ -165,3 +178,19 @@ def test_a_vector_environment_that_is_otherwise_than_ours_is_refused(envs, what)
             protocol.Task.of("otherwise-v0")
     finally:
         gym.registry.pop("otherwise-v0")
+
+
+@pytest.mark.parametrize("reward, shown", [(1.0, "1.0"), (np.ones(3), r"\[1.0, 1.0, 1.0\]")])
+def test_a_reward_of_another_number_is_refused_before_a_file_is_written(reward, shown, tmp_path):
+    class Paying(ToyEnv):
+        def step(self, action):
+            observation, _, *rest = super().step(action)
+            return observation, reward, *rest
+
+    gym.register("paying-v0", entry_point=Paying)
+    try:
+        with pytest.raises(SystemExit, match=rf"paying-v0: step must give rewards of shape \(2,\), not {shown}$"):
+            run_script("cleanrl_style/ppo_gated.py", "--env-id", "paying-v0", "--run-dir", tmp_path / "run")
+    finally:
+        gym.registry.pop("paying-v0")
+    assert not list(tmp_path.iterdir())

@@ -92,6 +92,7 @@ NAMES = {"linear": "weighted sum", "chebyshev": "Chebyshev's utility"}
 
 def main(args: Args) -> None:
     """Play, or take what was played before; write the table and the picture."""
+    paths.make_writable("--path", args.path.parent)
     task = protocol.Task.of(args.env_id, site_seed=args.site_seed)
     front, choices = study(task, protocol.evaluation_seeds(task, 1))
     print(front.to_string(index=False, float_format="%.3f"))
@@ -99,7 +100,6 @@ def main(args: Args) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with protocol.replacing(path) as file:
         front.to_csv(file, index=False, float_format="%.6g", lineterminator="\n")
-    args.path.parent.mkdir(parents=True, exist_ok=True)
     with protocol.replacing(args.path) as file:
         title = f"{args.env_id}, site {args.site_seed}: constant plans"
         draw(front, choices, title).savefig(file, format="png", dpi=110)

@@ -13,7 +13,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from analysis import stored
+from analysis import paths, stored
 from analysis.studies import open_loop
 from analysis.studies.fronts import ALL_ON, GAINS, YEARS, path_of, plan_means, with_gains
 from cleanrl_style import protocol
@@ -140,7 +140,7 @@ def main(args: Args) -> None:
     draw_mechanisms(below[:2], mechanisms)
     draw_variance(below[2], components)
 
-    args.path.parent.mkdir(parents=True, exist_ok=True)
+    paths.make_writable("--path", args.path.parent)
     with protocol.replacing(args.path) as file:
         figure.savefig(file, format="png", dpi=120, metadata={"Software": None})
     plt.close(figure)

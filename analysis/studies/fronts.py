@@ -209,6 +209,7 @@ def main(args: Args) -> None:
         "columns": RETURNS + STAND,
         "physics": open_loop.fingerprint(),
     }
+    paths.make_writable("--output-dir", folder)
     finished = {case: stored.is_finished(path_of(folder, *case), settings | {"case": case}) for case in todo}
     print(f"{sum(finished.values())} of {len(todo)} fronts are there, in {folder}", flush=True)
     each = most_episodes(budget)

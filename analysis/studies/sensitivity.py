@@ -19,6 +19,7 @@ import pandas as pd
 
 import sim
 from analysis import stored
+from analysis.paths import make_writable
 from analysis.studies import open_loop
 from cleanrl_style import protocol
 from sim.parameters import ORDERED_CONSTANTS, Parameter
@@ -342,6 +343,7 @@ def main(args: Args) -> None:
         print(effects(table).to_string(float_format="%+.3f", index=False))
         return
 
+    make_writable("--output-dir", args.output_dir)
     settings = {
         "sites": site_seeds,
         "weathers": WEATHERS,

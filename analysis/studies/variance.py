@@ -158,6 +158,7 @@ def main(args: Args) -> None:
     if args.sites < 4 or args.weathers < 2:
         sys.exit(f"variance.py: --sites >= 4 and --weathers >= 2 are allowed, not {args.sites}, {args.weathers}")
     folder = args.output_dir or paths.results(args.quick) / "variance"
+    paths.make_writable("--output-dir", folder)
     settings = asdict(args) | {"output_dir": None, "physics": open_loop.fingerprint()}
     site_seeds = [open_loop.FIRST_SITE_SEED + k for k in range(args.sites)]
     rewards = play(site_seeds, args.weathers)

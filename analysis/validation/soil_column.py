@@ -18,6 +18,7 @@ import pandas as pd
 
 import boreal_env
 import sim
+from analysis import paths
 from analysis.validation.conduction import Above, Column, Grid, Ground, layer_mean, spun_up, thawed_depth
 from analysis.validation.surface import RecordedStands
 from cleanrl_style import protocol
@@ -268,7 +269,7 @@ def markdown(table: pd.DataFrame) -> str:
 
 def main(args: Args) -> None:
     """Run the three comparisons, print their tables, and write what they are made of."""
-    args.output_dir.mkdir(parents=True, exist_ok=True)
+    paths.make_writable("--output-dir", args.output_dir)
     deeper = {f"to {boundary:g} m": layers_to(boundary) for boundary in BOUNDARY_DEPTHS_M}
     schemes, simulated = run_schemes(args, SCHEMES | deeper)
     depths = pd.DataFrame(

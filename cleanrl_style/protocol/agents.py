@@ -36,6 +36,7 @@ class Policy:
 
     def __call__(self, observations, masks, accrued_returns):
         """Probabilities (n, 25) for observations (n, d), masks (n, 25) and accrued returns (n, m)."""
+        self._check_returns(accrued_returns)
         return self.probabilities(observations, masks, accrued_returns)
 
     def act(self, observation, mask, accrued_returns=None, generator: np.random.Generator | None = None):
@@ -54,19 +55,22 @@ class Policy:
             raise ValueError(f"{self.name}: an observation is not finite")
         if not masks.any(axis=1).all():
             raise ValueError(f"{self.name}: a mask has no valid action")
-        if accrued_returns is None and self.looks_back:
-            raise ValueError(f"{self.name} looks at the returns accrued so far: give accrued_returns")
+        self._check_returns(accrued_returns)
         accrued = np.zeros((len(masks), 0)) if accrued_returns is None else np.atleast_2d(accrued_returns)
         wanted = (len(masks), _objectives(self.arguments))
         if self.looks_back and accrued.shape != wanted:
             raise ValueError(f"{self.name}: accrued_returns {wanted} are allowed, got {accrued.shape}")
-        if self.looks_back and not np.isfinite(accrued).all():
-            raise ValueError(f"{self.name}: accrued_returns are not finite")
+        if self.looks_back and not (accrued.dtype.kind in "biuf" and np.isfinite(accrued).all()):
+            raise ValueError(f"{self.name}: accrued_returns are not finite numbers")
         if generator is not None and not isinstance(generator, np.random.Generator):
             raise ValueError(f"generator: a numpy.random.Generator is allowed, got {type(generator).__name__}")
         uniforms = None if generator is None else generator.random(len(masks))
         actions = choose_actions(self.probabilities(observations, masks, accrued), uniforms)
         return int(actions[0]) if np.ndim(observation) == 1 else actions
+
+    def _check_returns(self, accrued_returns) -> None:
+        if accrued_returns is None and self.looks_back:
+            raise ValueError(f"{self.name} looks at the returns accrued so far: give accrued_returns")
 
     @property
     def env_id(self) -> str:
@@ -158,9 +162,10 @@ def _objectives(arguments: dict) -> int:
 def _script_module(name: str, path) -> ModuleType:
     """The script as a module."""
     if path is None:
-        if importlib.util.find_spec(f"cleanrl_style.{name}") is None:
+        # a dot in its name would be taken for a package's
+        if "." in name or importlib.util.find_spec(f"cleanrl_style.{name}") is None:
             raise FileNotFoundError(
-                f"no cleanrl_style/{name}.py; script=path, on a command line --script, names another"
+                f"no cleanrl_style/{name}.py to import; script=path, on a command line --script, names another"
             )
         return importlib.import_module(f"cleanrl_style.{name}")
     spec = importlib.util.spec_from_file_location(name, path)
@@ -171,4 +176,6 @@ def _script_module(name: str, path) -> ModuleType:
         spec.loader.exec_module(module)
     except SyntaxError as error:
         raise ValueError(f"script {error.filename}, line {error.lineno}: {error.msg}") from error
+    except ImportError as error:
+        raise ValueError(f"script {path}: {error}") from error
     return module

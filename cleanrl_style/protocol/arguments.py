@@ -114,6 +114,9 @@ def ask(env_id: str, flag: str = "--env-id", **env_kwargs) -> Task:
     """The environment's answers; exits with one line if there is none, or one that the scripts cannot handle."""
     if env_id.count(":") > 1 or not all(env_id.split(":")):
         fail(f"{flag} {no_environment(ValueError(repr(env_id)))}")
+    module = env_id.rpartition(":")[0]
+    if module.endswith(".py") or module and not all(map(str.isidentifier, module.split("."))):
+        fail(f"{flag} {env_id}: a module is allowed, such as pond:pond-v0, with PYTHONPATH=. where pond.py lies")
     try:
         return Task.of(env_id, **env_kwargs)
     except (gym.error.Error, ImportError) as error:

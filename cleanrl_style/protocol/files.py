@@ -1,4 +1,4 @@
-"""Files that nobody ever sees half of."""
+"""Files that nobody ever sees half of, and the sign that a table has been cut short since."""
 
 import contextlib
 import os
@@ -17,3 +17,8 @@ def replacing(path: Path):
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def is_cut(table: Path) -> bool:
+    """Whether the last line of a table has no end, which ours all have."""
+    return not table.read_bytes().endswith(b"\n")

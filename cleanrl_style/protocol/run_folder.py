@@ -30,7 +30,7 @@ from cleanrl_style.protocol import tracking, training_envs
 from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, not_default
 from cleanrl_style.protocol.course import Course
 from cleanrl_style.protocol.evaluation import PRIMARY, episodes_by_policy, lanes_of_evaluation
-from cleanrl_style.protocol.files import replacing
+from cleanrl_style.protocol.files import is_cut, replacing
 from cleanrl_style.protocol.fronts import objectives_of, weight_columns
 from cleanrl_style.protocol.progress import Progress
 from cleanrl_style.protocol.reference import physics_name, reference_returns
@@ -196,7 +196,8 @@ class Run:
         if (self.folder / "evaluation.csv").exists():
             damaged = damage_of(self.folder, len(self.args.eval_weights))
             if damaged:
-                fail(f"{self.folder / damaged} is damaged; --overwrite starts over")
+                what = "damaged" if (self.folder / damaged).exists() else "missing"
+                fail(f"{self.folder / damaged} is {what}; --overwrite starts over")
             print(f"{self.folder}: this run is finished (--overwrite starts over)")
             sys.exit(0)
         code_here = {**self.config["versions"], "commit": self.config["commit"]}
@@ -457,21 +458,26 @@ def is_foreign(config_file: Path) -> bool:
 
 
 def damage_of(folder: Path, weights: int) -> str | None:
-    """Which file of a finished run, all written whole, something has cut short or changed since; None if none."""
+    """Which file of a finished run, all written whole, something has cut short, changed or removed since, if any."""
     evaluation, policy = folder / "evaluation.csv", folder / "policy.pt"
     for table in sorted(folder.glob("*.csv")):
-        if not table.read_bytes().endswith(b"\n"):
+        if is_cut(table):
             return table.name
     try:
         table = pd.read_csv(evaluation)
         by_weight = table.groupby(["policy", *weight_columns(objectives_of(table.columns))]).size()
         alike = by_weight.groupby("policy").agg(lambda episodes: len(episodes) == weights and episodes.nunique() == 1)
-        whole = len(alike) and alike.all()
+        # a column that the environment does not report is empty throughout
+        numbers = table.drop(columns="policy").to_numpy(dtype=float)
+        known = np.isfinite(numbers).all(axis=0) | np.isnan(numbers).all(axis=0)
+        whole = len(alike) and alike.all() and known.all()
     except (ValueError, KeyError):
         whole = False
     if not whole:
         return evaluation.name
-    return policy.name if policy.exists() and not zipfile.is_zipfile(policy) else None
+    # fixed strategies and other libraries' algorithms leave neither a checkpoint nor a policy
+    trained = policy.exists() or (folder / "checkpoint.pt").exists()
+    return policy.name if trained and not zipfile.is_zipfile(policy) else None
 
 
 def remove(path: Path) -> None:

@@ -79,7 +79,7 @@ class Task:
         return task
 
     def _check_behaviour(self, env: gym.Env) -> None:
-        """Refuse a user's environment that does not observe its preference, or has no valid action."""
+        """Refuse a user's environment that does not observe its preference, has no valid action, or pays otherwise."""
         weights = 2.0 ** -np.arange(1, len(self.objectives) + 1)  # exact in float32
         weights[-1] = 1 - weights[:-1].sum()
         weights = np.array([0.25, 0.75]) if len(weights) == 2 else weights
@@ -87,19 +87,22 @@ class Task:
         if not np.array_equal(seen, weights[:-1]):
             entries = "observation 0" if len(weights) == 2 else f"observations 0 to {len(weights) - 2}"
             raise ValueError(f"reset(options={{'preference': w}}) must give w as {entries}")
-        as_mask(env.get_wrapper_attr("action_masks")())
+        mask = as_mask(env.get_wrapper_attr("action_masks")())
+        _check_rewards("step", env.step(int(mask.argmax()))[1], weights.shape)
         if self.has_lockstep:
             self._check_lockstep(weights)
 
     def _check_lockstep(self, weights: np.ndarray) -> None:
-        """Refuse a user's vector environment that restarts episodes, or takes preferences, otherwise than ours."""
+        """Refuse a user's vector environment that restarts episodes, takes preferences or pays otherwise than ours."""
         with contextlib.closing(self.make_lockstep(2)) as envs:
             if envs.metadata.get("autoreset_mode") is not gym.vector.AutoresetMode.SAME_STEP:
                 raise ValueError("its vector environment must restart episodes within the step: SAME_STEP autoreset")
             both = np.stack([weights, weights[::-1]])
-            seen = envs.reset(seed=[0, 1], options={"preference": as_option(both)})[0][:, : len(weights) - 1]
-            if not np.array_equal(seen, both[:, :-1]):
+            observations, _ = envs.reset(seed=[0, 1], options={"preference": as_option(both)})
+            if not np.array_equal(observations[:, : len(weights) - 1], both[:, :-1]):
                 raise ValueError("its vector environment must give each its own of reset(options={'preference': ws})")
+            actions = self.action_masks(envs, observations).argmax(axis=1)
+            _check_rewards("its vector environment", envs.step(actions)[1], both.shape)
 
     @property
     def num_objectives(self) -> int:
@@ -191,6 +194,12 @@ def final_info(infos: dict, i: int, keys=("site_seed", *EPISODE_INFO)) -> dict:
 
     info = infos.get("final_info", {})
     return {key: of_one(info[key]) for key in keys if key in info}
+
+
+def _check_rewards(whose: str, rewards, shape: tuple[int, ...]) -> None:
+    """ValueError for rewards of another shape, which numpy might spread over all objectives."""
+    if np.shape(rewards) != shape:
+        raise ValueError(f"{whose} must give rewards of shape {shape}, not {np.asarray(rewards).tolist()}")
 
 
 def _check_spaces(env: gym.Env) -> tuple[str, ...]:

@@ -110,6 +110,9 @@ def simulate_many(
     for package in ("xarray", "zarr"):
         if find_spec(package) is None:
             raise ValueError(f'simulate_many needs {package}: pip install -e ".[region]"')
+    for name, value in (("overwrite", overwrite), ("progress", progress)):
+        if not isinstance(value, (bool, np.bool_)):
+            raise ValueError(f"{name}: True or False is allowed, got {value!r}")
     table = check_sites(sites, others, seed)
     one = check_world(years, threads, arguments, table)
     chosen, label = check_choice(actions, label, len(table), one)

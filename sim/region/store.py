@@ -65,6 +65,7 @@ class Store:
             there = settings_of(self.path)
             if not self.overwrite:
                 self._compare(there)
+                check_whole(self.path)
                 self.waiting = []
                 if not data.exists():  # killed after its last act but one
                     shutil.rmtree(self.partial, ignore_errors=True)
@@ -161,6 +162,18 @@ def settings_of(folder: Path) -> dict:
         return json.loads(zarr.open_group(folder, mode="r").attrs["settings"])
     except (OSError, KeyError, ValueError) as error:
         raise ValueError(f"{folder}: no store of simulate_many; name another path") from error
+
+
+def check_whole(folder: Path) -> None:
+    """ValueError if a part of a store cannot be read: whoever reads it later would not be told of which."""
+    import zarr
+
+    try:
+        for _, array in zarr.open_group(folder, mode="r").arrays():
+            for first in range(0, array.shape[0], array.chunks[0]):
+                array[first : first + array.chunks[0]]
+    except (OSError, RuntimeError, ValueError) as error:
+        raise ValueError(f"{folder} is damaged ({error}); overwrite=True starts over") from error
 
 
 def locked(path: Path, store: Path):
