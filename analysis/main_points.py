@@ -73,14 +73,18 @@ def six_rows(results) -> str:
 
 def of_more_steps(results) -> str:
     """The row of the best method with `MORE_STEPS`; none until both worlds have several seeds."""
-    rows = results.rows_of_two_objectives()
-    setting = f"total_timesteps={MORE_STEPS}, vectorization=lockstep"
-    of_worlds = [rows.get((LEARNED[-1], env_id, setting), []) for env_id in WORLDS]
+    of_worlds = [with_more_steps(results, env_id) for env_id in WORLDS]
     if min(map(len, of_worlds)) < 2:
         return ""
     values = " | ".join(shown(main_results.scores(replicates)) for replicates in of_worlds)
     seeds = " and ".join(dict.fromkeys(str(len(replicates)) for replicates in of_worlds))
     return f"| {methods.title(LEARNED[-1])}, {MORE_STEPS:,} steps | {seeds} | {values} |\n"
+
+
+def with_more_steps(results, env_id: str) -> list:
+    """The runs of the best method with `MORE_STEPS` in a world."""
+    setting = f"total_timesteps={MORE_STEPS}, vectorization=lockstep"
+    return results.rows_of_two_objectives().get((LEARNED[-1], env_id, setting), [])
 
 
 def on_sites(replicates: list) -> pd.DataFrame:
@@ -192,6 +196,12 @@ def paragraph(results, env_id: str) -> str:
         + f"; {named(above(rows[PLANTING]))} above planting half and half; "
         f"{named(below)} below that."
     )
+    longer = with_more_steps(results, env_id)
+    if len(longer) > 1:
+        ahead += (
+            f" With {MORE_STEPS:,} steps and {of_seeds(longer)} {methods.title(LEARNED[-1])} scores "
+            f"{shown(main_results.scores(longer))}; its score less 100 is {points(longer, best_plans, best_plans)}."
+        )
     few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]
     if few:
         ahead += f" Few training seeds: {listed([f'{methods.title(*method)} {len(rows[method])}' for method in few])}."
