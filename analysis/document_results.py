@@ -410,7 +410,7 @@ TABLES = {
     "distances": distances,
     "other_worlds": other_worlds,
     "single_sites": sites_alone,
-    "six_rows": main_points.six_rows,
+    "short_table": main_points.short_table,
     "in_words": main_points.in_words,
     "outside": other_libraries,
     "splits": splits,

@@ -50,7 +50,7 @@ def shown(scores: dict) -> str:
     return f"{value:.0f}" + ("" if np.isnan(low) or low == high else f" [{low:.0f}, {high:.0f}]")
 
 
-def six_rows(results) -> str:
+def short_table(results) -> str:
     """Scores of two plans that look at nothing and of four trained methods, in both worlds; the best with more steps.
 
     That of a single training is not shown: another seed's may be far from it.

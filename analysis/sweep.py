@@ -9,7 +9,6 @@ on from its checkpoint. When all are finished, a row a run is in `--output`, and
 """
 
 import dataclasses
-import importlib.util
 import itertools
 import re
 import signal
@@ -29,6 +28,7 @@ from analysis import archive, commands, paths, runs
 from analysis.tables.common import over_seeds, readable
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
+from cleanrl_style.protocol.agents import load_script
 from sim.block import LANES, lanes_for
 from sim.executor import HERE, RAY_HERE, NoCluster, check_address, default_address
 
@@ -97,14 +97,10 @@ def arguments_of(script: Path) -> type:
     """The class `Args` of a script."""
     if not script.is_file() or script.suffix != ".py":
         protocol.fail(f"{script}: no script there, a file that ends in .py")
-    spec = importlib.util.spec_from_file_location(script.stem, script)
-    module = sys.modules[script.stem] = importlib.util.module_from_spec(spec)  # where its help texts are looked for
     try:
-        spec.loader.exec_module(module)
-    except SyntaxError as error:
-        protocol.fail(f"script {error.filename}, line {error.lineno}: {error.msg}")
-    except ImportError as error:
-        protocol.fail(f"script {script}: {error}")
+        module = load_script(script.stem, script)
+    except ValueError as error:
+        protocol.fail(str(error))
     if not hasattr(module, "Args"):
         protocol.fail(f"{script}: no class Args, which the arguments of a training script are")
     return module.Args

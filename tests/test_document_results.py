@@ -80,10 +80,20 @@ def test_every_section_without_runs_names_a_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     results = Results((), experiments.jobs(), tmp_path / "none")
     names = {name for text in texts for _, name, _ in document_results.SECTION.findall(text)}
-    need_none = {"speed", "shares", "towers", "misses", "six_rows", "boreal_map", "scaling", "region_killed", "splits"}
+    need_none = {
+        "speed",
+        "shares",
+        "towers",
+        "misses",
+        "short_table",
+        "boreal_map",
+        "scaling",
+        "region_killed",
+        "splits",
+    }
     for name in names - need_none:
         assert re.search(r"[Nn]ot (run|timed) yet: `python analysis/", document_results.section(results, name)), name
-    assert document_results.section(results, "six_rows").count("not run yet") == len(main_points.LEARNED)
+    assert document_results.section(results, "short_table").count("not run yet") == len(main_points.LEARNED)
 
 
 def test_a_figure_is_shown_once_it_is_drawn(tmp_path, monkeypatch):

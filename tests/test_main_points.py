@@ -53,8 +53,8 @@ def results(monkeypatch):
     return SimpleNamespace(rows_of_two_objectives=lambda: rows)
 
 
-def test_six_rows(results):
-    lines = main_points.six_rows(results).splitlines()
+def test_short_table(results):
+    lines = main_points.short_table(results).splitlines()
     assert lines[0] == "| method | training seeds | `boreal-balanced-v0` | `boreal-generalist-v0` |"
     assert lines[2:] == [
         "| +100 a year | | 70 [65, 75] |  |",
@@ -68,9 +68,9 @@ def test_six_rows(results):
 
 def test_the_score_of_a_single_training_is_not_shown(results):
     results.rows_of_two_objectives()["ppo_gated", WORLD, "vectorization=lockstep"].pop()
-    assert "| PPO Gated | 4 | 80 [75, 85] |  |" in main_points.six_rows(results)
+    assert "| PPO Gated | 4 | 80 [75, 85] |  |" in main_points.short_table(results)
     del results.rows_of_two_objectives()["ppo_gated", WORLD, "vectorization=lockstep"][1:]
-    assert "| PPO Gated | 1 |  |  |" in main_points.six_rows(results)
+    assert "| PPO Gated | 1 |  |  |" in main_points.short_table(results)
 
 
 def test_more_steps_are_a_row_of_their_own(results):
@@ -79,7 +79,7 @@ def test_more_steps_are_a_row_of_their_own(results):
         for world in main_points.WORLDS
     }
     results.rows_of_two_objectives().update(runs)
-    assert main_points.six_rows(results).endswith(
+    assert main_points.short_table(results).endswith(
         "\n| Group PPO, 1,000,000 steps | 5 | 110 [105, 115] | 110 [105, 115] |\n"
     )
     words = " ".join(main_points.in_words(results).split())

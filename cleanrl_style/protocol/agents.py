@@ -4,6 +4,7 @@ import importlib
 import importlib.util
 import json
 import pickle
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -168,10 +169,15 @@ def _script_module(name: str, path) -> ModuleType:
                 f"no cleanrl_style/{name}.py to import; script=path, on a command line --script, names another"
             )
         return importlib.import_module(f"cleanrl_style.{name}")
+    return load_script(name, path)
+
+
+def load_script(name: str, path) -> ModuleType:
+    """The Python file as the module of that name. Raises FileNotFoundError or, if it cannot be imported, ValueError."""
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or not Path(path).exists():
         raise FileNotFoundError(f"script {path}: no Python file")
-    module = importlib.util.module_from_spec(spec)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)  # where texts of its annotations are looked up
     try:
         spec.loader.exec_module(module)
     except SyntaxError as error:
