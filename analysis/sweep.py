@@ -198,8 +198,6 @@ def main(args: Args) -> None:
         protocol.fail(f"--output {args.output}: the name of a file is allowed")
     paths.make_writable("--output", args.output.parent)
     paths.make_writable("--runs-dir", args.runs_dir)
-    if not re.fullmatch(rf"{HERE}|{RAY_HERE}|auto|\S+:\S+", args.address):
-        protocol.fail(f"--address {args.address!r}: {HERE}, {RAY_HERE}, auto or host:port is allowed")
     try:
         check_address(args.address)
     except NoCluster as error:

@@ -144,9 +144,8 @@ def parse(arguments: type):
         fail(message_of(errors.getvalue()))
     check_lists(args)
     check_limits(args)
-    if isinstance(getattr(args, "env_id", None), str):
-        check_environment(args.env_id)
-    check_episodes(args)
+    check_run_dir(args)
+    check_task(args)
     return args
 
 
@@ -196,8 +195,6 @@ def check_limits(args) -> None:
         for number in flat(value):
             if not low <= number <= high:
                 fail(f"--{name.replace('_', '-')} must lie in [{low}, {high}], not {number}")
-    if getattr(args, "run_dir", None) == "":
-        fail("--run-dir '': the name of a folder is allowed")
     if not hasattr(args, "num_envs"):
         return
     fill_in_envs(args)
@@ -211,6 +208,20 @@ def check_limits(args) -> None:
     steps = getattr(args, "total_timesteps", None)
     if steps is not None and steps < args.num_envs:
         fail(f"--total-timesteps {steps} must be at least --num-envs {args.num_envs}")
+
+
+def check_run_dir(args) -> None:
+    """End the script with one line for a folder that cannot be made, or not be written to."""
+    given = getattr(args, "run_dir", None)
+    if given is None:
+        return
+    if given == "":
+        fail("--run-dir '': the name of a folder is allowed")
+    there = next(path for path in (Path(given).absolute(), *Path(given).absolute().parents) if path.exists())
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        fail(
+            f"--run-dir {given}: cannot write there ({'not a folder' if there.is_file() else 'no permission'}: {there})"
+        )
 
 
 def check_environment(env_id: str) -> None:
@@ -229,17 +240,53 @@ def check_environment(env_id: str) -> None:
         fail(f"--env-id {env_id or repr(env_id)}: {no_environment(error)}")
 
 
-def check_episodes(args) -> None:
-    """End the script with one line for more episodes than there are sites to evaluate on, each of which has one."""
-    if getattr(args, "eval_episodes", 0) <= TEST_SITES or getattr(args, "site_seed", None) is not None:
-        return
+def check_task(args) -> None:
+    """End the script with one line for an environment that is not there, or a flag that does not go with a registered
+    one of ours; others are asked when they are loaded.
+    """
     env_id, mode = getattr(args, "env_id", None), getattr(args, "mode", None)
-    if env_id is not None and ":" not in env_id:
+    if not isinstance(env_id, str):
+        known: dict = {"mode": mode or "generalist"}
+    else:
+        check_environment(env_id)
         import gymnasium as gym
 
-        mode = gym.spec(env_id).kwargs.get("mode")
-    if mode == "generalist" or env_id is None and mode is None:
+        known = {} if ":" in env_id else gym.spec(env_id).kwargs
+    if "mode" not in known:
+        return
+    check_mode(args, known["mode"])
+    objectives = known.get("objectives", ("carbon", "thaw"))
+    check_scales(args, objectives)
+    check_weights_given(args, len(objectives))
+    one_site = known["mode"] == "site-specific" or getattr(args, "site_seed", None) is not None
+    if not one_site and getattr(args, "eval_episodes", 0) > TEST_SITES:
         fail(f"--eval-episodes {args.eval_episodes}: at most {TEST_SITES} are allowed, as many as there are test sites")
+
+
+def check_mode(args, mode: str) -> None:
+    """End the script with one line for a --mode that is not the environment's."""
+    if getattr(args, "mode", None) not in (None, mode):
+        fail(f"--mode {args.mode} contradicts --env-id {args.env_id}, which is {mode}")
+
+
+def check_scales(args, objectives: tuple[str, ...]) -> None:
+    """End the script with one line for --reward-scales that are not one an objective, or all 0."""
+    scales = getattr(args, "reward_scales", None)
+    if scales is None:
+        return
+    if len(scales) != len(objectives):
+        names = ", ".join(objectives)
+        fail(f"--reward-scales: {len(objectives)} numbers, of {names}, are allowed, not {list(scales)}")
+    if not any(scales):
+        fail("--reward-scales: not all of them 0, which leaves nothing to learn")
+
+
+def check_weights_given(args, number: int) -> None:
+    """End the script with one line for --eval-weights, or a --preference, of which each has not `number` numbers."""
+    for name in ("preference", "eval_weights"):
+        given = flat(getattr(args, name, None))
+        if number != 2 and len(given) % number:
+            fail(f"--{name.replace('_', '-')}: {number} numbers a weight, not {len(given)} in all")
 
 
 def no_environment(error: Exception) -> str:

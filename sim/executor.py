@@ -1,5 +1,6 @@
 """Independent tasks, on this machine or on a Ray cluster: the one place that knows of Ray."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from importlib.util import find_spec
@@ -9,6 +10,7 @@ from typing import Any
 from sim.stands import available_cores
 
 HERE, RAY_HERE = "none", "local"  # addresses: threads of this process; Ray, started on this machine for the time
+CLUSTER = re.compile(r"auto|[^\s:/]+:\d+|\w+://\S+")  # addresses of a Ray that is there
 RETRIES = 20  # of a task whose worker or node was killed
 OBJECT_STORE_BYTES = 200_000_000  # of a Ray of our own: results are a few megabytes each
 
@@ -23,7 +25,9 @@ def default_address() -> str:
 
 
 def check_address(address: str) -> None:
-    """Refuse, in one line, what needs Ray where Ray is not installed."""
+    """Refuse, in one line, what is no address, and what needs Ray where Ray is not installed."""
+    if not isinstance(address, str) or address not in (HERE, RAY_HERE) and not CLUSTER.fullmatch(address):
+        raise NoCluster(f"address {address!r}: {HERE}, {RAY_HERE}, auto, HOST:PORT and ray://HOST:PORT are allowed")
     if address != HERE and find_spec("ray") is None:
         raise NoCluster(f'address {address}: it needs Ray, pip install -e ".[ray]"; without it {HERE} is allowed')
 

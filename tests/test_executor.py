@@ -44,6 +44,12 @@ def test_an_error_of_a_task_is_raised():
         list(executor.each(lambda task: 1 / task, [1, 0, 1], workers=2))
 
 
+@pytest.mark.parametrize("address", ["foo", "foo:", ":6379", "", None, 6379])
+def test_what_is_no_address_is_refused_before_anything_is_tried(address):
+    with pytest.raises(ValueError, match="address .*: none, local, auto, HOST:PORT and ray://HOST:PORT are allowed"):
+        list(executor.each(abs, [1], address=address))
+
+
 @pytest.mark.skipif(find_spec("ray") is not None, reason="Ray is there")
 def test_ray_is_named_where_it_is_missing():
     with pytest.raises(ValueError, match=r"address local: it needs Ray, pip install -e \"\.\[ray\]\"; without it none"):

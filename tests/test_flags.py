@@ -94,11 +94,33 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
             "--eval-episodes 201: at most 200 are allowed, .*",
         ),
         (["--seed"], ".*--seed.*"),
+        (
+            ["--env-id", "boreal-balanced-v0", "--mode", "site-specific"],
+            "--mode site-specific contradicts --env-id boreal-balanced-v0, which is generalist",
+        ),
+        (["--reward-scales", "1"], r"--reward-scales: 2 numbers, of carbon, thaw, are allowed, not \[1.0\]"),
+        (["--reward-scales", "0", "0"], "--reward-scales: not all of them 0, which leaves nothing to learn"),
+        (
+            ["--env-id", "boreal-timber-v0", "--eval-weights", "0.5"],
+            "--eval-weights: 3 numbers a weight, not 1 in all",
+        ),
+        (
+            ["--run-dir", f"{__file__}/run"],
+            rf"--run-dir {__file__}/run: cannot write there \(not a folder: {__file__}\)",
+        ),
     ],
 )
 def test_a_bad_value_is_named(given, message):
     with pytest.raises(SystemExit, match=f"^error: {message}$"):
         run_script("cleanrl_style/ppo_gated.py", *given)
+
+
+@pytest.mark.parametrize("given", [["--reward-scales", "1"], ["--run-dir", __file__], ["--env-id", "boreal-v9"]])
+def test_a_value_that_does_not_go_with_the_environment_is_answered_before_torch_is_loaded(given):
+    _, err = python("-X", "importtime", ROOT / "cleanrl_style" / "ppo_gated.py", *given).communicate()
+    *loaded, answer = err.splitlines()
+    assert answer.startswith(f"error: {given[0]}")
+    assert "torch" not in {line.split("|")[-1].strip() for line in loaded}
 
 
 def test_one_site_has_as_many_episodes_as_are_asked_for(monkeypatch):

@@ -119,7 +119,7 @@ def test_a_script_whose_import_is_missing_is_named(tmp_path):
 @pytest.mark.parametrize(
     "changes, message",
     [
-        ({"address": "foo"}, "--address 'foo': none, local, auto or host:port is allowed"),
+        ({"address": "foo"}, "--address 'foo': none, local, auto, HOST:PORT and ray://HOST:PORT are allowed"),
         ({"address": ""}, "--address '': none"),
         ({"runs_dir": SCRIPT}, "--runs-dir .*: cannot write there"),
         ({"output": ROOT}, "--output .*: the name of a file is allowed"),

@@ -8,7 +8,16 @@ import gymnasium as gym
 import numpy as np
 
 import boreal_env
-from cleanrl_style.flags import check_environment, check_limits, fail, fill_in_envs, no_environment
+from cleanrl_style.flags import (
+    check_environment,
+    check_limits,
+    check_mode,
+    check_scales,
+    check_weights_given,
+    fail,
+    fill_in_envs,
+    no_environment,
+)
 from cleanrl_style.protocol.fronts import evaluation_weights, return_columns
 from cleanrl_style.protocol.reference import reference_returns
 from cleanrl_style.protocol.sites import evaluation_seeds, published_seeds
@@ -38,8 +47,7 @@ def make_task(args, *, preference=None, hide_site: bool = False) -> Task:
         args.eval_weights = (args.preference,)
     fill_in(args, registered)
 
-    if args.mode != registered.mode:
-        fail(f"--mode {args.mode} contradicts --env-id {args.env_id}, which is {registered.mode}")
+    check_mode(args, registered.mode)
     given = {"thaw_formulation": args.thaw_formulation, "site_seed": args.site_seed}
     env_kwargs = {name: value for name, value in given.items() if value != getattr(registered, name, None)}
     for name in env_kwargs if not registered.boreal else ():
@@ -139,17 +147,11 @@ def fill_in(args, registered: Task) -> None:
     number = registered.num_objectives
     if getattr(args, "reward_scales", ()) is None:
         args.reward_scales = (1.0,) * number
-    if len(getattr(args, "reward_scales", range(number))) != number:
-        names = ", ".join(registered.objectives)
-        fail(f"--reward-scales: {number} numbers, of {names}, are allowed, not {list(args.reward_scales)}")
-    if not any(getattr(args, "reward_scales", (1,))):
-        fail("--reward-scales: not all of them 0, which leaves nothing to learn")
+    check_scales(args, registered.objectives)
     if getattr(args, "eval_weights", ()) is None:
         args.eval_weights = evaluation_weights(number)
     elif number != 2 and hasattr(args, "eval_weights") and np.ndim(args.eval_weights) == 1:
-        if len(args.eval_weights) % number:
-            flag = "--preference" if hasattr(args, "preference") else "--eval-weights"
-            fail(f"{flag}: {number} numbers a weight, not {len(args.eval_weights)} in all")
+        check_weights_given(args, number)
         args.eval_weights = tuple(map(tuple, np.reshape(args.eval_weights, (-1, number)).tolist()))
 
 

@@ -18,7 +18,7 @@ import pandas as pd
 
 import sim
 from sim.block import compiling, is_compiled, lanes_for
-from sim.executor import HERE, each
+from sim.executor import HERE, check_address, each
 from sim.management import NUM_ACTIONS, as_array, check_actions
 from sim.parameters import check_name
 from sim.region.plan import Plan
@@ -113,6 +113,7 @@ def simulate_many(
     for name, value in (("overwrite", overwrite), ("progress", progress)):
         if not isinstance(value, (bool, np.bool_)):
             raise ValueError(f"{name}: True or False is allowed, got {value!r}")
+    check_address(address)
     table = check_sites(sites, others, seed)
     one = check_world(years, threads, arguments, table)
     chosen, label = check_choice(actions, label, len(table), one)
