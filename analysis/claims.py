@@ -134,6 +134,8 @@ def explanation(claim: Claim, found: Finding, numbers: dict[Claim, int]) -> list
     lines = []
     if found.rule and found.verdict != UNTESTABLE:
         lines.append(f"Holds if {found.rule}.")
+    if found.verdict == FAILS and found.small:
+        lines.append("It fails because no effect large enough to count is left, not by a sign of its own.")
     if claim.repeats is not None:
         number = numbers[claim.repeats]
         lines.append(f"No vote: the fact is that of [claim {number}](#claim-{number}).")

@@ -112,6 +112,15 @@ def test_ranges_and_several_parts():
     assert all_of(yes, above(seeds(1, 0.5, 2, count=2))).waits and not all_of(yes, above(seeds(0, -1, 1))).waits
 
 
+def test_why_a_claim_fails_is_known():
+    opposite_sign, too_small, too_small_or_opposite = seeds(-2, -3, -1), seeds(0.1, 0.05, 0.2), seeds(0, -0.1, 0.1)
+    fails = [above(one, least=0.5) for one in (opposite_sign, too_small, too_small_or_opposite)]
+    assert [(one.holds, one.small) for one in fails] == [(False, False), (False, True), (False, True)]
+    assert below(seeds(-0.1, -0.2, -0.05), least=0.5).small and not below(seeds(2, 1, 3), least=0.5).small
+    holds = above(seeds(2, 1, 3), least=0.5)
+    assert all_of(fails[1], holds).small and not all_of(*fails).small and not all_of(holds, holds).small
+
+
 def test_numbers_as_text():
     assert [short(x) for x in (-0.123456, 1280.4, 3.8, 0, np.nan)] == ["−0.123", "1,280", "3.8", "0", "?"]
     assert str(seeds(1, -0.5, 2)) == "1 [−0.5, 2]" and seeds(1, 0, 2).basis == "5 training seeds"

@@ -1,7 +1,7 @@
 """A claim of the paper, a number of ours with its interval, and the rules by which numbers become verdicts."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -110,6 +110,7 @@ class Answer:
     holds: bool | None
     rule: str
     waits: bool = False  # for more training seeds
+    small: bool = False  # it does not hold, for no other reason than that no effect large enough to count is left
 
 
 @dataclass(frozen=True)
@@ -120,12 +121,13 @@ class Finding:
     verdict: str
     rule: str = ""
     waits: bool = False
+    small: bool = False
 
 
 def finding(rows: list[Row], answer: Answer, otherwise: str = FAILS) -> Finding:
     """The finding of an answer; `otherwise` is the verdict on a claim that does not hold."""
     verdict = UNDECIDED if answer.holds is None else HOLDS if answer.holds else otherwise
-    return Finding(rows, verdict, answer.rule, answer.waits)
+    return Finding(rows, verdict, answer.rule, answer.waits, answer.small)
 
 
 @dataclass(frozen=True)
@@ -163,14 +165,14 @@ def above(number: Number, limit: float = 0.0, least: float | None = None, what: 
     if not number.decides:
         return Answer(None, rule, waits=True)
     fails = high <= limit or (least is not None and high < limit + least)
-    return Answer(False if fails else True if low > limit else None, rule)
+    return Answer(False if fails else True if low > limit else None, rule, small=fails and high > limit)
 
 
 def below(number: Number, limit: float = 0.0, least: float | None = None, what: str = "the interval") -> Answer:
     """Holds if the interval lies below the limit; not if above, or if all of it is less than `least` below it."""
     answer = above(number.mirrored, -limit, least)
     no_effect = "" if least is None else f" (not, if all of it is above {short(limit - least)})"
-    return Answer(answer.holds, f"{what} lies below {short(limit)}{no_effect}", answer.waits)
+    return replace(answer, rule=f"{what} lies below {short(limit)}{no_effect}")
 
 
 def within(number: Number, low: float, high: float, what: str = "the value") -> Answer:
@@ -210,4 +212,6 @@ def all_of(*answers: Answer) -> Answer:
     holds = [answer.holds for answer in answers]
     rule = " and ".join(dict.fromkeys(answer.rule for answer in answers))
     decided = False if False in holds else None if None in holds else True
-    return Answer(decided, rule, decided is None and any(answer.waits for answer in answers))
+    small = all(answer.small for answer in answers if answer.holds is False)
+    waits = decided is None and any(answer.waits for answer in answers)
+    return Answer(decided, rule, waits, small=decided is False and small)

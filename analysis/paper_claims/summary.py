@@ -98,16 +98,19 @@ SENTENCES = (
 )
 
 
-def counted(verdicts: Counter) -> str:
-    """The first sentence: how the directions came out, a vote a fact."""
+def counted(verdicts: Counter, small: int) -> str:
+    """The first sentence: how the directions came out, a vote a fact; small : facts that fail by that alone."""
     open_ = verdicts.total() - verdicts[HOLDS] - verdicts[FAILS]
     return (
         f"Of the {verdicts.total()} facts of the kind {DIRECTION} {verdicts[HOLDS]} hold here, {verdicts[FAILS]} do "
-        f"not hold in our simulator, and {open_} are open or cannot be tested."
+        f"not hold in our simulator ({verdicts[FAILS] - small} of them because numbers say otherwise, {small} because "
+        f"no effect large enough to count is left), and {open_} are open or cannot be tested."
     )
 
 
 def sentences(findings: dict[Claim, tuple[int, Finding]], directions: Counter) -> str:
     """All of them as a list; findings : a claim's number and finding."""
-    lines = [counted(directions), *(one.text(*findings[one.claim]) for one in SENTENCES)]
+    voting = [found for claim, (_, found) in findings.items() if claim.kind == DIRECTION and claim.repeats is None]
+    small = sum(found.small for found in voting if found.verdict == FAILS)
+    lines = [counted(directions, small), *(one.text(*findings[one.claim]) for one in SENTENCES)]
     return "".join(f"{number}. {line}\n" for number, line in enumerate(lines, start=1))
