@@ -22,7 +22,7 @@ from analysis.figures import learning_asymmetry, learning_curves, learning_diffi
 from analysis.paper_claims.claim import FEWEST_SEEDS
 from analysis.results import Results
 from analysis.studies import ensembles
-from analysis.tables import best_known, group_choices, main_results, runtime, single_sites
+from analysis.tables import best_known, choices, main_results, runtime, single_sites
 from analysis.tables import learning_difficulty as difficulty_table
 from analysis.tables.common import has_numbers, over_seeds
 from cleanrl_style import protocol
@@ -223,21 +223,26 @@ def difficulty(results: Results) -> str:
     return excerpts.markdown(list(difficulty_table.COLUMNS.values()), cells)
 
 
-def choices(results: Results) -> str:
-    """Group PPO with one choice changed less the default, bold where the interval of five seeds and more lacks 0."""
-    table = group_choices.make(results)
-    if not has_numbers(table, group_choices.COLUMNS):
-        return not_run("main", "balanced", "group", "budgets")
-    decimals = {"score_greedy": 1, "score_sampled": 1} | dict.fromkeys(group_choices.CHANGES, 2)
-    rows = []
-    for row in table[table.seeds > 0].to_dict("records"):
-        cells = cells_of(row, decimals)
-        for k, name in enumerate(decimals):
-            told = row[f"{name}_low"] > 0.0 or row[f"{name}_high"] < 0.0
-            cells[k] = f"**{cells[k]}**" if told and row["seeds"] >= FEWEST_SEEDS else cells[k]
-        rows.append([flags(row["setting"]), f"`{row['environment']}`", str(row["seeds"]), *cells])
-    header = [group_choices.COLUMNS[name] for name in ("setting", "environment", "seeds", *decimals)]
-    return excerpts.markdown(header, rows)
+def choices_of(script: str, *experiments_: str):
+    """A script with one choice changed less its default, bold where the interval of five seeds and more lacks 0."""
+
+    def written(results: Results) -> str:
+        table = choices.make(results)
+        table = table[(table.method == script) & (table.seeds > 0)]
+        if not has_numbers(table, choices.COLUMNS):
+            return not_run("main", "balanced", *experiments_)
+        decimals = {"score_greedy": 1, "score_sampled": 1} | dict.fromkeys(choices.CHANGES, 2)
+        rows = []
+        for row in table.to_dict("records"):
+            cells = cells_of(row, decimals)
+            for k, name in enumerate(decimals):
+                told = row[f"{name}_low"] > 0.0 or row[f"{name}_high"] < 0.0
+                cells[k] = f"**{cells[k]}**" if told and row["seeds"] >= FEWEST_SEEDS else cells[k]
+            rows.append([flags(row["setting"]), f"`{row['environment']}`", str(row["seeds"]), *cells])
+        header = [choices.COLUMNS[name] for name in ("setting", "environment", "seeds", *decimals)]
+        return excerpts.markdown(header, rows)
+
+    return written
 
 
 def averaged(results: Results) -> str:
@@ -416,7 +421,10 @@ TABLES = {
     "splits": splits,
     "generalisation": on_other_sites,
     "difficulty": difficulty,
-    "group_choices": choices,
+    "group_choices": choices_of("ppo_group", "group", "budgets"),
+    "gated_choices": choices_of("ppo_gated", "controls", "variants"),
+    "curriculum_choices": choices_of("ppo_curriculum", "controls"),
+    "eupg_choices": choices_of("eupg_var_lambda", "variants"),
     "ensembles": averaged,
     **{f"figure_{name}": figure_of(name) for name in FIGURES},
 }

@@ -22,9 +22,9 @@ from analysis import runs as finished
 from analysis.results import Results
 from analysis.tables import (
     best_known,
+    choices,
     curriculum_selection,
     detailed_objectives,
-    group_choices,
     growing_season_correlations,
     lambda_violations,
     learned_strategies,
@@ -54,7 +54,7 @@ TABLES = (
     learning_difficulty,
     single_sites,
     best_known,
-    group_choices,
+    choices,
 )
 
 SHOWN = 3  # commands of what is not there

@@ -16,8 +16,8 @@ from analysis.results import Results
 from analysis.studies.signal_to_noise import CONTRASTS
 from analysis.tables import (
     best_known,
+    choices,
     curriculum_selection,
-    group_choices,
     growing_season_correlations,
     learning_difficulty,
     physical_conflicts,
@@ -388,7 +388,7 @@ def test_the_score_of_both_policies(tmp_path, monkeypatch):
     assert table.score_sampled["zero_change"].dropna().tolist() == [0]
 
 
-def test_what_a_choice_of_group_ppo_is_worth(tmp_path):
+def test_what_a_choice_is_worth(tmp_path):
     """The changed one gains 2, 1 and 1 less at weights 0, 0.5 and 1, where the best constant plans have 4, 2 and 2."""
     plans = [
         {"env_id": MAIN[1], "action": action, "seed": seed, "carbon_return": c, "thaw_return": t}
@@ -401,7 +401,7 @@ def test_what_a_choice_of_group_ppo_is_worth(tmp_path):
         write_run(tmp_path / f"default{seed}", "ppo_group", seed, (1, 2, 3), (5, 4, 3), **flags)
     for seed in (2, 3):
         write_run(tmp_path / f"changed{seed}", "ppo_group", seed, (2, 2, 2), (3, 2, 1), ent_coef=0.0, **flags)
-    table = group_choices.make(Results((tmp_path,), experiments.jobs(), tmp_path / "studies"))
+    table = choices.make(Results((tmp_path,), experiments.jobs(), tmp_path / "studies"))
     row = table.set_index(["environment", "setting"]).loc[MAIN[1], "ent_coef=0.0, vectorization=lockstep"]
     assert row.seeds == 2
     # mean loss of (2 + (0 + 2) / 2 + 1) / 3 of a mean (4 + 2 + 2) / 3 that the plans have; all sites and seeds alike

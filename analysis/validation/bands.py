@@ -7,9 +7,11 @@ from analysis.validation.document import BLACK, BLUE, GREEN, GREY, ORANGE, PURPL
 from analysis.validation.held_stands import KINDS, Run, hold
 from analysis.validation.observed_bands import ALL, CHECKS, FELLED, WARMING, Check
 from analysis.validation.scores import IN, Band
+from boreal_env import BALANCED_WORLD
 
 SKIPPED_YEARS = 7
 KEPT_YEARS = 5
+FOREST = "mature conifer"
 UNDISTURBED = {"fire": False, "insects": False}
 COLOURS = dict(zip(ALL, (BLUE, ORANGE, GREEN, SKY, PURPLE, BLACK), strict=True))
 SHORT = dict(zip(ALL, ("conifer", "deciduous", "mixed", "young", "old", "open"), strict=True))
@@ -27,6 +29,10 @@ def report(sites: int) -> Part:
         for kind in check.bands:
             misses += _miss(name, check, kind, values[name][kind])
     pair_rows, pair_misses = _pairs(runs)
+    balanced = {
+        kind: hold(KINDS[kind], sites, KEPT_YEARS, SKIPPED_YEARS, UNDISTURBED, **BALANCED_WORLD)
+        for kind in (FOREST, "open")
+    }
     text = f"""{sites} sites drawn as for episodes of the environment, each with {SKIPPED_YEARS + KEPT_YEARS} years of
 its own weather, of which the last {KEPT_YEARS} are averaged; the same sites and weather for every stand. Stands are
 held: on every 1 January trees, soil carbon and organic layer are put back to those of the start. Mature is 1500
@@ -42,8 +48,32 @@ layer still that of the conifers) and when the organic layer has become that of 
 
 {document.table(["", "warming [K]", "band"], pair_rows, left=3)}
 
+{_permafrost_text(runs, balanced)}
+
 ![Bands](images/validation_bands.png)"""
     return Part(text, {"validation_bands.png": draw(values)}, [*misses, *pair_misses])
+
+
+def _permafrost_text(runs: dict[str, Run], balanced: dict[str, Run]) -> str:
+    """On how many sites there is permafrost, and how deep it thaws where there is."""
+
+    def found(run: Run) -> tuple[str, str]:
+        frozen = run.sites("permafrost_top_temperature_c") < 0.0
+        depth = run.sites("active_layer_depth_m")[frozen]
+        return percent(frozen.mean()), number(float(np.median(depth))) if frozen.any() else "-"
+
+    rows = [
+        [world, *(cell for kind in (FOREST, "open") for cell in found(of[kind]))]
+        for world, of in (
+            ("boundary drawn, as in `boreal-generalist-v0`", runs),
+            ("boundary and soil carbon balanced, as in `boreal-balanced-v0`", balanced),
+        )
+    ]
+    header = ["", *(f"{kind}: {what}" for kind in (FOREST, "open") for what in ("permafrost", "thaws to [m]"))]
+    return f"""Sites with permafrost, ground whose mean over the years stays below 0 degC where thaw is deepest, and the
+median of that depth on them. Balanced ground has the observed weather, too.
+
+{document.table(header, rows, left=1)}"""
 
 
 def run_all(sites: int) -> dict[str, Run]:
@@ -51,7 +81,7 @@ def run_all(sites: int) -> dict[str, Run]:
     runs = {}
     for kind, stocks in KINDS.items():
         runs[kind] = hold(stocks, sites, KEPT_YEARS, SKIPPED_YEARS, UNDISTURBED, keep_daily=("swe_mm",))
-    layer = float(np.median(runs["mature conifer"].sites("organic_layer_m")))
+    layer = float(np.median(runs[FOREST].sites("organic_layer_m")))
     runs[FELLED] = hold({**KINDS["open"], "organic_layer_m": layer}, sites, KEPT_YEARS, SKIPPED_YEARS, UNDISTURBED)
     return runs
 
@@ -97,7 +127,7 @@ def _miss(name: str, check: Check, kind: str, sample: np.ndarray) -> list[Miss]:
 
 def _pairs(runs: dict[str, Run]) -> tuple[list[list[str]], list[Miss]]:
     """Surface soil of open ground less that of mature conifers on the same sites."""
-    forest = WARMING.value(runs["mature conifer"])
+    forest = WARMING.value(runs[FOREST])
     rows, misses = [], []
     for label, kind in (("organic layer as it was", FELLED), ("organic layer of open ground", "open")):
         sample = WARMING.value(runs[kind]) - forest

@@ -59,10 +59,12 @@ QUANTITIES = {
 }
 
 
-def simulate(stand: TowerStand, forcing: pd.DataFrame, index: pd.DatetimeIndex, repeats: int) -> pd.DataFrame:
-    """Daily output for the days `index` of the forcing's years, after running through them `repeats` - 1 times."""
+def simulate(
+    stand: TowerStand, forcing: pd.DataFrame, index: pd.DatetimeIndex, repeats: int, output: str = "daily"
+) -> pd.DataFrame:
+    """Output for the days, or years, `index` of the forcing's years, after running through them `repeats` - 1 times."""
     years = len(forcing.index.year.unique())
-    daily = sim.simulate(
+    table = sim.simulate(
         stand.site,
         NO_CHANGE,
         seed=0,
@@ -71,9 +73,9 @@ def simulate(stand: TowerStand, forcing: pd.DataFrame, index: pd.DatetimeIndex, 
         initial=stand.initial,
         constants=stand.constants,
         lai=stand.lai,
-        output="daily",
+        output=output,
     )
-    return daily[daily["year"] >= (repeats - 1) * years].set_index(index)
+    return table[table["year"] >= (repeats - 1) * years].set_index(index)
 
 
 def pair(fluxes: pd.DataFrame, modelled: pd.DataFrame) -> dict[str, pd.DataFrame]:

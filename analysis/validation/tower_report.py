@@ -207,6 +207,7 @@ def _poker_flat_text(comparison: Comparison, repeats: int) -> tuple[str, list[Mi
         ["snow gone, measured [day of year]", *(str(observed[year]) for year in years)],
         ["snow gone, modelled [day of year]", *(str(melt[year]) for year in years)],
         ["largest snow water, modelled [mm]", *(number(swe[swe.index.year == year].max(), 0) for year in years)],
+        ["deepest thaw, from the moss's surface, modelled [m]", *map(number, _thaw_depths(repeats))],
     ]
     spring, spring_misses = _spring(comparison, poker_flat_days(repeats, measured_spring=True))
     text = f"""### US-Prr, Poker Flat, 2011-14
@@ -232,7 +233,7 @@ By month:
 
 {tower_comparison.course_table(pairs)}
 
-{document.table(["snow", *map(str, years)], snow_rows)}
+{document.table(["snow and thaw", *map(str, years)], snow_rows)}
 
 {spring}
 
@@ -242,6 +243,13 @@ By month:
     likely = "too little snow (sublimation), which ages and melts too early; no refreezing of meltwater"
     what = "day that the tower's albedo gives, mean of four springs"
     return text, [*_snow_off_miss(comparison.site, difference, what, likely), *spring_misses]
+
+
+def _thaw_depths(repeats: int) -> list[float]:
+    """Deepest thaw [m] of each of US-Prr's years."""
+    years = pd.Index(poker_flat.YEARS)
+    annual = tower_comparison.simulate(tower_stands.US_PRR, poker_flat.forcing(), years, repeats, "annual")
+    return annual["active_layer_depth_m"].tolist()
 
 
 def _ground_heat_text(comparison: Comparison, closed: list[float]) -> str:

@@ -1,4 +1,4 @@
-"""What each choice of Group PPO is worth: its runs with one thing changed less those without, paired by training seed.
+"""What each choice of a script is worth: its runs with one thing changed less those without, paired by training seed.
 
 How far the preference is followed is the change of a return from weight 0 to 1. Differences are over the same sites,
 and their 95 % intervals over seeds and sites together.
@@ -13,9 +13,8 @@ from analysis.tables.common import row_of
 from analysis.tables.main_results import named
 from cleanrl_style import protocol
 
-SCRIPT = "ppo_group"
-EXPERIMENTS = ("group", "budgets")
-MADE_BY = "python analysis/reproduce.py --only main balanced group budgets"
+EXPERIMENTS = ("group", "budgets", "controls", "variants")
+MADE_BY = f"python analysis/reproduce.py --only main balanced {' '.join(EXPERIMENTS)}"
 CHANGES = ("carbon_change", "thaw_change")
 COLUMNS = {
     "method": "method",
@@ -47,10 +46,11 @@ def score_difference(pairs: list[tuple], policy: str) -> tuple[float, float, flo
 
 def make(results) -> pd.DataFrame:
     """One row per changed choice."""
-    defaults = {GENERALIST: by_seed(results.of("main", SCRIPT)), BALANCED: by_seed(results.of("balanced", SCRIPT))}
     rows = []
-    for key in dict.fromkeys(job.row for job in results.jobs if job.script == SCRIPT and job.experiment in EXPERIMENTS):
-        changed, default = by_seed(results.rows[key]), defaults[key[1]]
+    for key in dict.fromkeys(job.row for job in results.jobs if job.experiment in EXPERIMENTS):
+        script, env_id, _ = key
+        changed = by_seed(results.rows[key])
+        default = by_seed(results.of({GENERALIST: "main", BALANCED: "balanced"}[env_id], script))
         pairs = [(changed[seed], default[seed]) for seed in sorted(changed.keys() & default.keys())]
         row = row_of(key, len(pairs))
         if pairs:
