@@ -402,7 +402,9 @@ def test_what_a_choice_is_worth(tmp_path):
     for seed in (2, 3):
         write_run(tmp_path / f"changed{seed}", "ppo_group", seed, (2, 2, 2), (3, 2, 1), ent_coef=0.0, **flags)
     table = choices.make(Results((tmp_path,), experiments.jobs(), tmp_path / "studies"))
-    row = table.set_index(["environment", "setting"]).loc[MAIN[1], "ent_coef=0.0, vectorization=lockstep"]
+    row = table.set_index(["method", "environment", "setting"]).loc[
+        "ppo_group", MAIN[1], "ent_coef=0.0, vectorization=lockstep"
+    ]
     assert row.seeds == 2
     # mean loss of (2 + (0 + 2) / 2 + 1) / 3 of a mean (4 + 2 + 2) / 3 that the plans have; all sites and seeds alike
     assert (row.score_greedy, row.score_greedy_low, row.score_greedy_high) == pytest.approx((-50, -50, -50))
