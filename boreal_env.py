@@ -174,7 +174,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     mixes (0, 0.25, 0.5, 0.75, 1). Planting adds seedlings of that mix; thinning cuts the oldest class first, so that
     the remaining stand nears the mix. Without a change of density the mix has nothing to act on: 10 to 14 are alike,
     and 12 stands for doing nothing. `action_masks()` says which actions can be carried out in full; the others are
-    legal, do what can be done, and cost a penalty. The density penalty is another: a stand at or above
+    legal, do what can be done, and cost a penalty: planting reaches 2000 stems/ha, thinning leaves 150 and cuts trees
+    from `harvest_min_class` on. The density penalty is another: a stand at or above
     `density_limit` after the action costs it whatever the action, valid or not.
 
     ## Reward Space

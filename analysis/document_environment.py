@@ -67,7 +67,7 @@ paper is silent.
 are those of the value *x* in its unit, from physics. Names that end in `2yr` are of the year before last. The `site_`
 entries are the 62 parameters of `sim/site_parameters.csv`, scaled by the ranges that they are sampled from. Of the last
 year,
-- `total_change` is that of biomass, soil and wood products, `products_stored` what went into products,
+- `total_change` is that of biomass, dead wood, soil and wood products, `products_stored` what went into products,
 - `thinning_loss` is the carbon of all that was cut, the part that became products included,
 - `density_change` is what was carried out of the action, `mix_change` how much the action changed the conifer fraction
   of the stand (without a density change 0 but for round-off).

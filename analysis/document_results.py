@@ -49,7 +49,6 @@ HEADING = (
     + "|---" * 12
     + "|\n"
 )
-NOT_COMPARED = ("--thaw-formulation", "--total-timesteps", "--site-seed")  # rows of other rewards, budgets, sites
 RETURNS = ("carbon_0", "carbon_1", "thaw_0", "thaw_1", "scalarized")
 COLUMNS = {"score_greedy": 0, "score_sampled": 0, "gain_scalarized": 2, "gain_hypervolume": 2} | dict.fromkeys(
     RETURNS, 2
@@ -315,7 +314,6 @@ def other_libraries(results: Results) -> str:
 
 #: Split -> what it is for; the shifts besides.
 SPLITS = {
-    "training": "the first episodes of `--seed 1`; a training goes on to ever new sites, all with seeds below 10⁹",
     "validation": "variants and budgets are chosen on them; no training learns from them",
     "test": "results are of them; chosen on them were the constant plans (decision 65), and to go without relabelling "
     "(decision 109)",
@@ -327,7 +325,7 @@ def splits(results: Results) -> str:
     rows = []
     for name, text in SPLITS.items():
         seeds = sites.published_seeds(name)
-        which = f"{seeds[0]} to {seeds[-1]}" if name == "training" else f"{len(seeds)} of `{sites.TABLE}`"
+        which = f"{len(seeds)} of `{sites.TABLE}`"
         rows.append([f"`{name}`", which, text])
     for name, moved in SHIFTS.items():
         worlds = [world for world in ("balanced", "sampled") if name in shifts_of(world)]
@@ -379,7 +377,7 @@ def section(results: Results, name: str) -> str:
     if name in OF_ALL:
         for script in (*methods.TRAINED, *methods.STRATEGIES):
             rows += named(script, rows_of(results, script, OF_ALL[name]))
-        rows = [row for row in rows if not any(flag in row[0] for flag in NOT_COMPARED)]
+        rows = [row for row in rows if "`--" not in row[0]]  # a method's own page has its variants
     elif name == "heuristics":
         for script in methods.STRATEGIES:
             rows += named(script, rows_of(results, script))
@@ -458,7 +456,9 @@ def main(args: Args) -> None:
             print(f"no page yet: {path}", file=sys.stderr)
             continue
         text = path.read_text(encoding="utf-8")
-        new, count = SECTION.subn(lambda match: match[1] + section(results, match[2]) + match[3], text)
+        new, count = SECTION.subn(
+            lambda match: match[1] + excerpts.without_empty_columns(section(results, match[2])) + match[3], text
+        )
         if not count:
             protocol.fail(f"{path}: no section of results (<!-- results of ... --> to <!-- end of results -->)")
         with protocol.replacing(path) as file:

@@ -1,6 +1,7 @@
 """What README.md and pages of docs/ show of results/first_run.txt, readme.csv and benchmark.csv, of the files of
 scaling and maps, and of docs/validation.md, as Markdown."""
 
+import itertools
 import re
 from pathlib import Path
 
@@ -48,6 +49,20 @@ def figures(names) -> pd.DataFrame:
 def markdown(header, rows) -> str:
     """A table, a line each."""
     return "".join(f"| {' | '.join(line)} |\n" for line in (header, ["---"] * len(header), *rows))
+
+
+def without_empty_columns(text: str) -> str:
+    """The text, its tables without the columns that no row has anything in."""
+    parts = []
+    for is_table, lines in itertools.groupby(text.splitlines(keepends=True), lambda line: line.startswith("|")):
+        part = "".join(lines)
+        if is_table:
+            header, _, *rows = map(cells, part.splitlines())
+            filled = [k for k, column in enumerate(zip(*rows, strict=True)) if any(column)]
+            if 0 < len(filled) < len(header):
+                part = markdown([header[k] for k in filled], [[row[k] for k in filled] for row in rows])
+        parts.append(part)
+    return "".join(parts)
 
 
 def speed() -> str:

@@ -3,7 +3,7 @@
     python analysis/generalisation.py RUN [RUN ..]                      # outside: four shifts of the test sites
     python analysis/generalisation.py RUN --split validation calmer     # or any splits
 
-A split is the test, validation or training sites, or the test sites with one property, or two, moved out of the range
+A split is the test or validation sites, or the test sites with one property, or two, moved out of the range
 that sites are drawn from (`sim/task/shifts.py`); "outside" is all of those. The test sites are always there, to compare
 with. A run is a finished one with its policy.pt; on the test sites its own evaluation counts, and an archived run will
 do. Printed are, for both policies, the score against the constant plans of the split, two ratios, and how much each
@@ -144,7 +144,7 @@ class Args:
     runs: tyro.conf.Positional[tuple[Path, ...]]
     """folders of finished runs, of one environment"""
     split: tuple[str, ...] = (OUTSIDE,)
-    """test, validation, training, a shift such as calmer, or outside: all shifts"""
+    """test, validation, a shift such as calmer, or outside: all shifts"""
     episodes: int = 50
     """the first sites of each split"""
     output: Path | None = None

@@ -189,8 +189,7 @@ def paragraph(results, env_id: str) -> str:
     ahead += f", not told apart from {listed(titles_of(alike))}." if alike else "."
     ahead += (
         f" Its score less that of 100 deciduous trees a year is {points(rows[best], deciduous, best_plans)}. "
-        "By the interval of the difference on the same sites "
-        f"{named(above(best_plans))} above 100"
+        f"Compared on the same sites {named(above(best_plans))} above 100"
         + (f", {named(even)} not told apart from it" if even else "")
         + (f", {below_it}" if under else "")
         + f"; {named(above(rows[PLANTING]))} above planting half and half; "
@@ -241,7 +240,8 @@ def following(rows: dict[tuple[str, str], list]) -> str:
     )
     text += f", and {named(less_cold, 'keep')} less." if less_cold else "."
     text += f" {named(unmoved, 'do')} the same whatever is asked for." if unmoved else ""
-    return f"{text} (Greedy; 0 is in neither the interval over seeds and sites nor the t interval over seeds.)"
+    told = "said is what two intervals tell from 0, that over seeds and sites and that over seeds alone"
+    return f"{text} (Greedy policies; {told}.)"
 
 
 def wrapped(text: str) -> str:

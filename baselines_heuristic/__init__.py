@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from cleanrl_style.flags import parse
@@ -13,7 +12,7 @@ class Args:
     """Evaluates a strategy that does not learn under the protocol of the trained agents and leaves a run folder."""
 
     seed: int = 1
-    """names the run's folder: the strategy has nothing random, and its episodes are always the same"""
+    """names the run's folder: episodes, and random actions, are always the same"""
     env_id: str | None = None
     """boreal-balanced-v0 or another that `python -m boreal_env` lists (None: the mode's)"""
     mode: Literal["generalist", "site-specific"] | None = None
@@ -60,13 +59,16 @@ def main(script: str, policy) -> None:
 
     import numpy as np
 
+    import boreal_env
     from cleanrl_style import protocol
 
     task = protocol.make_task(args)
     if not task.boreal:
         protocol.fail(f"--env-id {args.env_id}: fixed strategies know the boreal environments alone")
-    if task.masks is None or not task.observes_preference:
-        groups = "preference, state and age"
+    seen = task.make().unwrapped.observation_names
+    needed = {row.name for row in boreal_env.OBSERVATION if row.group != "site"} - {"preference"}
+    if task.masks is None or not task.observes_preference or not needed <= set(seen):
+        groups = ", ".join(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
         protocol.fail(f"--env-id {args.env_id}: fixed strategies look at {groups}; observation_groups must have them")
 
     played = obeying(policy)
@@ -75,7 +77,7 @@ def main(script: str, policy) -> None:
         # laid out as for two objectives, whatever their number: a strategy does not look at the weights
         return played(observations[:, task.num_objectives - 2 :], masks)
 
-    with protocol.Run(args, task, Path(script).stem) as run:
+    with protocol.Run(args, task, script) as run:
         start = time.perf_counter()
         corner = np.eye(task.num_objectives)[0]
         episodes, years = protocol.evaluate(task, action_probabilities, [corner], args.eval_episodes, ("sampled",))

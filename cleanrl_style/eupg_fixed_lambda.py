@@ -5,7 +5,6 @@ import math
 import random
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from cleanrl_style.flags import parse
@@ -102,12 +101,11 @@ class Agent(nn.Module):
         # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in the entropy
         return Categorical(logits=torch.where(mask, self.actor(x), -1e8), validate_args=False)
 
-    def get_action_and_value(self, x, mask, action=None):
-        """EUPG has no value: the last of the four is None."""
+    def get_action(self, x, mask, action=None):
         distribution = self.get_distribution(x, mask)
         if action is None:
             action = distribution.sample()
-        return action, distribution.log_prob(action), distribution.entropy(), None
+        return action, distribution.log_prob(action), distribution.entropy()
 
 
 def policy_input(observations, accrued_returns):
@@ -148,8 +146,11 @@ def compute_utilities(rewards, preferences, gamma, which, baseline="none", utili
 
 
 def eupg_loss(agent, x, mask, action, utility):
-    """Loss whose gradient is EUPG's, for what weights each action, and the policy's mean entropy."""
-    _, logprob, entropy, _ = agent.get_action_and_value(x, mask, action)
+    """Loss whose gradient is EUPG's, and the policy's mean entropy, for the utility (n,) that weights each action (n,).
+
+    x (n, observation + m) and mask (n, 25) are what the actions were drawn under.
+    """
+    _, logprob, entropy = agent.get_action(x, mask, action)
     return -(logprob * utility).mean(), entropy.mean()
 
 
@@ -175,7 +176,7 @@ if __name__ == "__main__":
             f"environment: {task.years * args.num_envs} steps"
         )
 
-    with protocol.Run(args, task, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
+    with protocol.Run(args, task, __file__, episodes=episode_columns, updates=update_columns) as run:
         # TRY NOT TO MODIFY: seeding
         random.seed(args.seed)
         np.random.seed(args.seed)
@@ -217,7 +218,7 @@ if __name__ == "__main__":
 
                 # ALGO LOGIC: action logic
                 with torch.no_grad():
-                    action, _, _, _ = agent.get_action_and_value(obs[-1], masks[-1])
+                    action, _, _ = agent.get_action(obs[-1], masks[-1])
                 actions.append(action)
 
                 # TRY NOT TO MODIFY: execute the game and log data.
@@ -228,10 +229,10 @@ if __name__ == "__main__":
                 rewards.append(reward.astype(np.float64))
                 episode_returns += reward
 
-            if not next_done.all():
+            if not next_done.all() or batch_steps not in (0, len(rewards) * args.num_envs):
                 protocol.fail(
-                    f"--env-id {args.env_id}: EUPG needs episodes of one length, and one ended at step "
-                    f"{len(rewards)} before the others"
+                    f"--env-id {args.env_id}: EUPG needs episodes of one length, and one ended at step {len(rewards)}, "
+                    f"others did not"
                 )
             if global_step > args.total_timesteps:
                 protocol.fail(

@@ -3,7 +3,6 @@
 import random
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from cleanrl_style.flags import MAX_ENVS, parse, require
@@ -58,6 +57,9 @@ class Args:
 
     num_envs = 1  # no flag: population x episodes_each
     trial = 12000, "ten minutes"  # a generation; what `--help` says
+    left = """A stopped search goes on with the same
+command, to the same bytes. The folder gets config.json, episodes.csv, updates.csv, evaluation.csv, policy.pt and
+summary.png, which docs/planners.md explains"""
     limits = {"block_years": (1, 10**6), "population": (4, MAX_ENVS), "episodes_each": (1, MAX_ENVS)}
 
 
@@ -200,9 +202,7 @@ def tell(algorithm, asked, gains):
 
 def nondominated(genes, gains):
     """Those candidates that no other one dominates, the first of equal ones."""
-    import moocore
-
-    kept = moocore.is_nondominated(gains, maximise=True)
+    kept = fronts.is_nondominated(gains)
     return genes[kept], gains[kept]
 
 
@@ -225,7 +225,7 @@ if __name__ == "__main__":
     update_columns = ("generation", "global_step", "front_size", "gain_hypervolume", "mean_best_gain")
 
     tables = {"episodes": task.episode_columns, "updates": update_columns}
-    with protocol.Run(args, task, Path(__file__).stem, plays_validation=False, **tables) as run:
+    with protocol.Run(args, task, __file__, plays_validation=False, **tables) as run:
         # TRY NOT TO MODIFY: seeding
         random.seed(args.seed)
         np.random.seed(args.seed)

@@ -4,7 +4,6 @@ import math
 import random
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from cleanrl_style.flags import parse
@@ -164,9 +163,11 @@ def make_policy(agent):
 
 
 def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda):
-    """Advantages (steps, envs, values), each value's for itself; dones[t] says that step t follows an episode's end.
+    """Advantages (steps, envs, values), each value's for itself, of rewards and values (steps, envs, values).
 
-    The end of an episode is terminal: nothing is worth anything beyond it, so nothing is bootstrapped.
+    dones (steps, envs, 1) say that a step follows an episode's end; next_value (envs, values) and next_done (envs, 1)
+    are of what comes after the last step. The end of an episode is terminal: nothing is worth anything beyond it, so
+    nothing is bootstrapped.
     """
     advantages = torch.zeros_like(rewards)
     lastgaelam = 0
@@ -218,7 +219,10 @@ def spread_preferences(num_groups, group_size, num_objectives):
 
 
 def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
-    """Policy loss, value loss, entropy, two estimates of the KL divergence and clip fraction of a minibatch."""
+    """Policy loss, value loss, entropy, two estimates of the KL divergence and clip fraction of a minibatch.
+
+    x (n, observation), mask (n, 25), values and their targets (n, values), all else (n,).
+    """
     _, logprob, entropy, value = agent.get_action_and_value(x, mask, action)
     logratio = logprob - old_logprob
     ratio = logratio.exp()
@@ -258,7 +262,7 @@ if __name__ == "__main__":
         "explained_variance",
     )
 
-    with protocol.Run(args, task, Path(__file__).stem, episodes=episode_columns, updates=update_columns) as run:
+    with protocol.Run(args, task, __file__, episodes=episode_columns, updates=update_columns) as run:
         # TRY NOT TO MODIFY: seeding
         random.seed(args.seed)
         np.random.seed(args.seed)

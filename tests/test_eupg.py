@@ -196,6 +196,14 @@ def test_a_budget_without_room_for_a_batch_leaves_no_folder(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_episodes_of_another_length_than_those_before_are_refused(tmp_path):
+    flags = ("--env-id", "toy_env:uneven-v0", "--total-timesteps", 100, "--run-dir", tmp_path)
+    with pytest.raises(
+        SystemExit, match="EUPG needs episodes of one length, and one ended at step 1[01], others did not"
+    ):
+        run_script("cleanrl_style/eupg_var_lambda.py", *flags)
+
+
 def test_the_scripts_differ_in_the_preference_and_nothing_else():
     fixed, variable = ((ROOT / "cleanrl_style" / f"eupg_{name}_lambda.py").read_text() for name in ("fixed", "var"))
     agents = [source.split("class Agent")[1].splitlines() for source in (fixed, variable)]

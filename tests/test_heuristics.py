@@ -102,9 +102,10 @@ def test_planting_every_year_is_the_constant_plan(tmp_path):
 def test_users_environments_are_refused(tmp_path):
     with pytest.raises(SystemExit, match="fixed strategies know the boreal environments alone"):
         run_script("baselines_heuristic/zero_change.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path / "run")
-    gym.register("unseen-v0", "boreal_env:BorealEnv", kwargs={"observation_groups": ("state", "age")})
-    with pytest.raises(SystemExit, match="observation_groups must have them"):
-        run_script("baselines_heuristic/target_density.py", "--env-id", "unseen-v0", "--run-dir", tmp_path / "run")
+    for name, groups in (("unseen-v0", ("state", "age")), ("little-v0", ("preference", "state", "age"))):
+        gym.register(name, "boreal_env:BorealEnv", kwargs={"observation_groups": groups})
+        with pytest.raises(SystemExit, match="observation_groups must have them"):
+            run_script("baselines_heuristic/target_density.py", "--env-id", name, "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 

@@ -95,15 +95,15 @@ def test_the_words_follow_from_the_numbers(results):
     )
     assert ahead == (
         "Of 5 trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds and a gain hypervolume "
-        "of 2.50. Its score less that of 100 deciduous trees a year is 15.0. By the interval of the difference on the "
-        "same sites none is above 100, Group PPO is not told apart from it, 4 below it; Group PPO is above planting "
+        "of 2.50. Its score less that of 100 deciduous trees a year is 15.0. Compared on the same sites "
+        "none is above 100, Group PPO is not told apart from it, 4 below it; Group PPO is above planting "
         "half and half; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
     )
     assert followed == (
         "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. Asked for thaw instead of "
         "carbon, Group PPO keeps more cold in the ground, and PPO Gated keeps less. Variable λ EUPG does the same "
-        "whatever is asked for. (Greedy; 0 is in neither the interval over seeds and sites nor the t interval over "
-        "seeds.)"
+        "whatever is asked for. (Greedy policies; said is what two intervals tell from 0, that over seeds and "
+        "sites and that over seeds alone.)"
     )
 
 

@@ -72,7 +72,7 @@ def test_networks_never_favour_an_invalid_action(task):
 LIBRARIES = {"maskable_ppo": "sb3_contrib"}
 FLAGS = {
     "pcn": ("--num-er-episodes", 2, "--num-step-episodes", 2),
-    "morld": ("--learning-starts", 100, "--exchange-every", 50, "--pop-size", 2, "--own-episodes", 1),
+    "morld": ("--learning-starts", 100, "--exchange-every", 50, "--pop-size", 2),
     "gpi_ls": ("--timesteps-per-iter", 100, "--own-episodes", 1),
     "maskable_ppo": ("--num-envs", 2),
 }
@@ -120,4 +120,11 @@ def test_what_does_not_go_together_is_refused_before_a_file_is_written(given, me
     pytest.importorskip("sb3_contrib")
     with pytest.raises(SystemExit, match=message):
         run_script("analysis/outside/maskable_ppo.py", *given, "--run-dir", tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_budget_of_morld_is_of_whole_rounds(tmp_path):
+    pytest.importorskip("morl_baselines")
+    with pytest.raises(SystemExit, match="--total-timesteps 12000: a multiple of --exchange-every 5000 is allowed"):
+        run_script("analysis/outside/morld.py", "--total-timesteps", 12000, "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()

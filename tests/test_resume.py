@@ -230,7 +230,7 @@ def test_a_table_shorter_than_its_checkpoint_is_refused(interrupted, tmp_path):
 def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, tmp_path):
     folder = copy(interrupted, tmp_path)
     config = json.loads((folder / "config.json").read_text())
-    config["versions"]["numpy"] = "1.0"
+    config["versions"]["numpy"], config["source"] = "1.0", "another"
     (folder / "config.json").write_text(json.dumps(config))
     first = start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_SECONDS="0.01")
     wait_for_rows(first, folder, 5)
@@ -239,7 +239,7 @@ def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, t
     os.killpg(first.pid, signal.SIGINT)
     code, out, err = finish(first)
     assert code == 130 and "resuming at step 600" in out
-    assert "was begun with numpy 1.0 there" in err and "Traceback" not in err
+    assert "was begun with numpy 1.0 there" in err and "source another there" in err and "Traceback" not in err
 
 
 def test_a_full_disk_leaves_the_old_checkpoint(interrupted, tmp_path):

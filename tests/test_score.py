@@ -1,5 +1,6 @@
 """Gains, the score, the returns that it is measured by, and what a run says of them at its end."""
 
+import sys
 import tokenize
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 
 import sim
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference, score, summary
+from cleanrl_style.protocol import reference, score, summary, tracking
 
 PAIR = ["carbon", "thaw"]
 WEIGHTS = np.array([(0.0, 1.0), (0.5, 0.5), (1.0, 0.0)])
@@ -105,6 +106,22 @@ def test_the_end_of_a_run_says_it(capsys):
     (followed,) = (line for line in lines if line.startswith("Following"))
     assert "carbon -2.00 (best plans +4.00), thaw -8.00 (best plans -4.00)" in followed
     assert all(len(line) <= 120 for line in lines)
+
+
+def test_that_nothing_was_learnt_is_said_of_returns_as_they_ship(capsys, monkeypatch):
+    stored = PLANS.assign(thaw_return=PLANS.thaw_return + 4e-5)  # of six digits
+    monkeypatch.setattr(sys.modules[__name__], "PLANS", stored)
+    for gain, said in ((0.0, 1), (0.01, 0)):
+        summary.print_score(PAIR, compare(greedy=((gain,) * 3, (gain,) * 3)))
+        assert capsys.readouterr().out.count("it has learnt nothing yet") == said
+
+
+def test_a_tracker_has_a_curve_for_each_weight():
+    row = {"global_step": 7, "preference": 0.5, "carbon_gain": 1.0, "plan": "x"}
+    assert tracking.numbers("validation", row) == {"validation/0.5/carbon_gain": 1.0}
+    assert tracking.numbers("episodes", row) == {"episodes/preference": 0.5, "episodes/carbon_gain": 1.0}
+    three = {"global_step": 7, "weight_carbon": 0.5, "weight_thaw": 0.25, "weight_timber": 0.25, "thaw_gain": 2.0}
+    assert tracking.numbers("validation", three) == {"validation/0.5/0.25/0.25/thaw_gain": 2.0}
 
 
 # --------------------------------------------------------------------------------------- of which physics

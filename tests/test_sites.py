@@ -61,15 +61,10 @@ def test_an_evaluation_takes_the_first_sites():
     for message, arguments in {
         "-1 episodes: a whole number, 1 or more, is allowed": (-1,),
         "201 episodes: the test split has 200 sites": (201,),
-        "split 'train': allowed are test, validation, training, warmer_boundary, .*, calmer, less_snow": (3, "train"),
+        "split 'train': allowed are test, validation, warmer_boundary, .*, calmer, less_snow": (3, "train"),
     }.items():
         with pytest.raises(ValueError, match=message):
             protocol.evaluation_seeds(task, *arguments)
-
-
-def test_the_training_split_is_where_a_training_begins():
-    seeds = protocol.evaluation_seeds(protocol.Task.of("boreal-generalist-v0"), 3, "training")
-    assert seeds == [1 * protocol.MAX_ENVS + i for i in range(3)]  # as the scripts reset environment i with --seed 1
 
 
 @pytest.mark.parametrize(
@@ -112,5 +107,5 @@ def test_support_points_fill_a_line_evenly():
 def test_splits_share_no_episode_where_no_sites_are_drawn():
     task = protocol.Task.of("boreal-generalist-v0", site_seed=3)
     seeds = [set(sites.evaluation_seeds(task, 100, split)) for split in sites.SPLITS]
-    assert sum(map(len, seeds)) == len(set.union(*seeds)) == 300
+    assert sum(map(len, seeds)) == len(set.union(*seeds)) == 200
     assert min(seeds[1]) > protocol.FIRST_EVALUATION_SEED

@@ -79,6 +79,21 @@ class HopelessToyEnv(ToyEnv):
         return np.zeros(25, dtype=bool)
 
 
+class UnevenToyEnv(ToyEnv):
+    """Every second episode is a step longer."""
+
+    episodes = 0
+
+    def reset(self, *, seed=None, options=None):
+        observation, info = super().reset(seed=seed, options=options)
+        self.episodes += 1
+        self.steps = -(self.episodes % 2)
+        return self._observation(), info
+
+    def _observation(self):
+        return np.clip(super()._observation(), 0, 1)
+
+
 class ToyVectorEnv(gym.vector.VectorEnv):
     """All environments in one call, for `--vectorization lockstep`; their episodes end, and restart, together."""
 
@@ -152,3 +167,4 @@ class ThreeToyEnv(ToyEnv):
 
 
 gym.register("toy-three-v0", entry_point="toy_env:ThreeToyEnv")
+gym.register("uneven-v0", entry_point="toy_env:UnevenToyEnv")

@@ -11,7 +11,6 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -43,22 +42,22 @@ class ValidActions(gym.spaces.Discrete):
 class Env(gym.Wrapper):
     """One environment, seeded by the run whatever a library asks for, without the preference in its observation.
 
-    seeds : of the episodes, in turn for ever; a single one begins a stream of ever new episodes.
+    seeds : of the episodes, in turn for ever, or of the first of a stream of ever new ones (`repeat=False`).
     finished : called with the episode's number, returns and last info when it ends.
     """
 
-    def __init__(self, task: protocol.Task, seeds: list[int], finished: Callable | None = None):
+    def __init__(self, task: protocol.Task, seeds: list[int], finished: Callable | None = None, repeat: bool = True):
         super().__init__(task.make())
         self.hidden = task.num_objectives - 1  # entries of the preference, at the front
         space = self.env.observation_space
         self.observation_space = gym.spaces.Box(space.low[self.hidden :], space.high[self.hidden :], dtype=space.dtype)
         self.action_space = ValidActions(self.env, seeds[0])
-        self.seeds, self.finished = seeds, finished
+        self.seeds, self.finished, self.repeat = seeds, finished, repeat
         self.steps, self.episodes, self.seconds = 0, 0, 0.0
 
     def reset(self, *, seed=None, options=None):
         """The next episode."""
-        begins = self.episodes == 0 or len(self.seeds) > 1
+        begins = self.episodes == 0 or self.repeat
         start = time.perf_counter()
         observation, info = self.env.reset(seed=self.seeds[self.episodes % len(self.seeds)] if begins else None)
         self.seconds += time.perf_counter() - start
@@ -149,7 +148,8 @@ class Session:
         def finished(env, info):
             self.finished(self.envs.index(env), weights, env.returns, info)
 
-        self.envs.append(Env(self.task, [self.args.seed * protocol.MAX_ENVS + len(self.envs)], finished))
+        first = self.args.seed * protocol.MAX_ENVS + len(self.envs)
+        self.envs.append(Env(self.task, [first], finished, repeat=False))
         return self.envs[-1]
 
     def finished(self, number: int, weights: np.ndarray, returns: np.ndarray, info: dict) -> None:
@@ -183,7 +183,7 @@ def main(script: str, args: Args, learn: Callable, samples: bool, check: Callabl
     if check is not None:
         check(args)
     tables = {"episodes": task.episode_columns, "cost": COST_COLUMNS}
-    with protocol.Run(args, task, Path(script).stem, plays_validation=False, **tables) as run:
+    with protocol.Run(args, task, script, plays_validation=False, **tables) as run:
         random.seed(args.seed)
         np.random.seed(args.seed)  # noqa: NPY002, the libraries draw from it
         torch.manual_seed(args.seed)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from analysis.outside.arguments import Args
-from cleanrl_style.flags import parse, require
+from cleanrl_style.flags import fail, parse, require
 
 require("morl_baselines", extra="outside")
 
@@ -31,14 +31,11 @@ class MORLDArgs(Args):
     """steps before the first update, by random actions"""
     target_entropy_scale: float = 0.3
     """aim of the policies' entropy, in that of 25 equal actions"""
-    own_episodes: int = 5
-    """episodes of each of its own evaluations"""
 
     limits: ClassVar = {
         "batch_size": (2, 10**6),
         "exchange_every": (1, 10**9),
         "learning_starts": (1, 10**9),
-        "own_episodes": (1, 10**6),
         "pop_size": (2, 1000),
         "target_entropy_scale": (0, 1),
     }
@@ -53,6 +50,8 @@ from morl_baselines.common.buffer import ReplayBuffer
 from morl_baselines.multi_policy.morld.morld import MORLD
 
 from analysis.outside.common import Session, main, masked
+
+OWN_EPISODES = 5  # of each of its own evaluations: the library takes no other number
 
 
 class SharedBuffer(ReplayBuffer):
@@ -94,7 +93,7 @@ def learn(session: Session):
     agent.close_wandb = lambda: None
     agent.train(
         args.total_timesteps,
-        session.own_evaluation(args.own_episodes),
+        session.own_evaluation(OWN_EPISODES),
         ref_point=np.full(task.num_objectives, -100.0),
         num_eval_episodes_for_front=1,
         checkpoints=False,
@@ -114,5 +113,13 @@ def learn(session: Session):
     return policy
 
 
+def check(args: MORLDArgs) -> None:
+    """Refuse a budget that the last of its rounds would exceed."""
+    if args.total_timesteps % min(args.exchange_every, args.total_timesteps):
+        fail(
+            f"--total-timesteps {args.total_timesteps}: a multiple of --exchange-every {args.exchange_every} is allowed"
+        )
+
+
 if __name__ == "__main__":
-    main(__file__, args, learn, samples=True)
+    main(__file__, args, learn, samples=True, check=check)

@@ -79,7 +79,7 @@ def play(agent, envs, design: Design) -> Episodes:
             x = eupg.policy_input(observations, returns)
             mask = torch.from_numpy(boreal_env.action_masks(observations))
             with torch.no_grad():
-                action, *_ = agent.get_action_and_value(x, mask)
+                action, *_ = agent.get_action(x, mask)
             observations, rewards, *_ = envs.step(action.numpy())
             returns += rewards
             years.append((x.numpy(), mask.numpy(), action.numpy(), rewards.astype(np.float64)))
@@ -106,9 +106,7 @@ def advantages(rewards: np.ndarray, utility: str, baseline: str) -> np.ndarray:
 
 def gradients(agent, inputs, masks, actions, weights) -> np.ndarray:
     """Gradients (k, parameters) of an episode's mean log-probability, weighted by each row of weights (k, years)."""
-    log_probability = agent.get_action_and_value(
-        torch.from_numpy(inputs), torch.from_numpy(masks), torch.from_numpy(actions)
-    )[1]
+    log_probability = agent.get_action(torch.from_numpy(inputs), torch.from_numpy(masks), torch.from_numpy(actions))[1]
     outputs = torch.from_numpy((weights / weights.shape[1]).astype(np.float32))
     parts = torch.autograd.grad(log_probability, list(agent.parameters()), outputs, is_grads_batched=True)
     return torch.cat([part.flatten(start_dim=1) for part in parts], dim=1).numpy()

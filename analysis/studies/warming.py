@@ -1,4 +1,4 @@
-"""How climate change moves what constant plans can reach, and at which warming no plan keeps the ground frozen.
+"""How climate change moves what constant plans can reach, and at which warming even the best loses the frozen ground.
 
     python analysis/studies/warming.py
 
@@ -258,23 +258,24 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         f"without a scenario and under three, from {start} to {end}, on {sites} sites; what a scenario is, is in "
         "[model.md](model.md), section 3. **Warming** is always that of boreal land against 1995-2014, in the mean of "
         "ten years; where it is the world's, that is said.",
-        f"**By {last}, at which warming does no plan keep the ground frozen?** It hangs on how cold the ground is:",
+        f"**By {last}, at which warming does even the best plan lose more than half of the sites?** It hangs on how "
+        "cold the ground is:",
         f"Frozen is ground that thaws less than {NEAR_SURFACE_M:.0f} m in each of ten years. In effect that is a deep "
         "node below 0 °C: where its mean passes 0 °C the modelled depth leaps by a metre or more. The ground's "
         f"temperature is that of the deep soil in {last}, without a scenario and without management. All are the same "
-        f"{len(ground)} of {sites} sites, those frozen in {first} and in {last} without a scenario. By the warming "
-        "reached, which is no threshold: the ground goes on cooling without a scenario, so that the same warming keeps "
-        "more of it frozen later, and none of these grounds is in balance with it:",
+        f"{len(ground)} of {sites} sites, those frozen in {first} and in {last} without a scenario. The table goes "
+        "by the warming that is reached. That is no threshold: the ground lags behind the warming, and without a "
+        "scenario it goes on cooling, so that at the same warming more of it is frozen later:",
         drift(plans, years, today, first, last),
         f"**How does that compare with what is published?** Under no change, {last} against the same years without a "
         "scenario. Thaw is the median, with its range, of the sites that are frozen in both; volume is of the sites "
         f"frozen in {today}, the last row of those frozen in {last} without a scenario.",
-        "*What explains what.* Too little is lost per K, and too late: the boundary of fixed temperature at 12 m goes "
-        "on taking up heat, and below the upper metres the ground warms less than it would. Thaw is too deep where the "
-        "ground stays frozen: the boundary works against that, so it is no explanation, and we count it as a miss. "
-        "Peng et al. have all permafrost, most of it north of these sites, and Stefan's equation; what makes the "
-        "difference has not been tested. More sites are lost than Peng et al. lose of their area, and fewer than the "
-        "IPCC's.",
+        "*What explains what.* Less is lost per K than AR6 says, and too late: the boundary of fixed temperature at "
+        "12 m goes on taking up heat, and below the upper metres the ground warms less than it would. Thaw is too "
+        "deep where the ground stays frozen: the boundary works against that, so it is no explanation, and we count "
+        "it as a miss. Peng et al. have all permafrost, most of it north of these sites, and Stefan's equation; what "
+        "makes the difference has not been tested. More sites are lost than Peng et al. lose of their area, and fewer "
+        "than in the middle of the IPCC's ranges.",
         "**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of no change and of the best "
         "plan for thaw alone, for both alike and for carbon alone; the share of sites whose best plan for both is "
         "another one than without a scenario; and the share of years, of all plans, in which the thaw reward is "

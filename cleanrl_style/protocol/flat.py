@@ -2,7 +2,8 @@
 
 
 def flat_parameters(network):
-    """One parameter that holds all of the network's, which become parts of it, as their gradients of its own.
+    """One parameter, of one dimension, that holds all of the network's; they become parts of it, as their gradients of
+    its own.
 
     Nothing is learned after what cuts them off: gradients set to None instead of zero, as `optimizer.zero_grad()` does
     unless it is told `set_to_none=False`, or a network that is moved, as by `agent.to(..)`.

@@ -60,6 +60,8 @@ RESULTS = (
 CHECKPOINT_STEPS = 2048
 #: How numbers are written into a run's tables.
 FLOAT_FORMAT = "%.9g"
+#: Of config.json, what says by which code beside the packages: the checkout's commit, the script's file.
+CODE = ("commit", "source")
 LONGEST_NAME = 200  # bytes of a folder's name; file systems allow 255
 
 
@@ -101,20 +103,24 @@ class Run:
     another run's, in use, damaged or not writable, or holds this run finished (exit 0).
     """
 
-    def __init__(self, args, task: Task, script: str, *, plays_validation: bool = True, **tables):
-        """plays_validation : whether the script calls `validate`; tables : name -> columns."""
-        self.args, self.task, self.script = args, task, script
+    def __init__(self, args, task: Task, script: str | Path, *, plays_validation: bool = True, **tables):
+        """script : its file, `__file__`, or a name alone; plays_validation : whether it calls `validate`; tables : name
+        -> columns."""
+        self.args, self.task, self.script = args, task, Path(script).stem
         self.stopped = False
         changed = not_default(args)
-        self.folder = Path(args.run_dir or Path("runs", script, folder_name(args.env_id, changed), f"seed{args.seed}"))
+        self.folder = Path(
+            args.run_dir or Path("runs", self.script, folder_name(args.env_id, changed), f"seed{args.seed}")
+        )
         self.config = {
-            "script": script,
+            "script": self.script,
             "arguments": {k: value for k, value in vars(args).items() if k not in FREE_ARGUMENTS},
             "not_default": changed,
             "primary_policy": PRIMARY,
             **({"ideal_point": task.utility.ideal} if task.utility.ideal else {}),
             "versions": versions(),
             "commit": commit(),
+            "source": hashlib.sha256(Path(script).read_bytes()).hexdigest()[:16] if Path(script).is_file() else None,
             "physics": physics_name(),
         }
         self.envs, self.checkpoint, self.checkpoint_step = None, None, 0
@@ -133,8 +139,8 @@ class Run:
                 name: Table(self.folder / f"{name}.csv", columns, sizes.get(name, 0))
                 for name, columns in tables.items()
             }
-        self.trackers = tracking.start(args, script, self.folder, self.config, self.checkpoint_step)
-        print(f"{script}: {args.env_id}, seed {args.seed}, into {self.folder}", flush=True)
+        self.trackers = tracking.start(args, self.script, self.folder, self.config, self.checkpoint_step)
+        print(f"{self.script}: {args.env_id}, seed {args.seed}, into {self.folder}", flush=True)
         if self.checkpoint:
             print(f"resuming at step {self.checkpoint_step:,}", flush=True)
 
@@ -184,7 +190,7 @@ class Run:
         try:
             config = json.loads(config_file.read_text(encoding="utf-8"))
             there = {"script": config["script"], **config["arguments"]}
-            code_there = {**config["versions"], "commit": config["commit"]}
+            code_there = {**config["versions"], **{name: config.get(name) for name in CODE}}
         except (ValueError, KeyError, TypeError) as error:
             fail(f"{config_file} is damaged ({error!r}); --overwrite starts over")
         here = json.loads(json.dumps({"script": self.script, **self.config["arguments"]}))
@@ -200,7 +206,7 @@ class Run:
                 fail(f"{self.folder / damaged} is {what}; --overwrite starts over")
             print(f"{self.folder}: this run is finished (--overwrite starts over)")
             sys.exit(0)
-        code_here = {**self.config["versions"], "commit": self.config["commit"]}
+        code_here = {**self.config["versions"], **{name: self.config[name] for name in CODE}}
         if code_there != code_here:
             print(f"warning: {self.folder} was begun with {differences(code_there, code_here)}", file=sys.stderr)
 
@@ -378,7 +384,7 @@ class Run:
         objectives, start = self.task.objectives, time.perf_counter()
         plans = reference_returns(self.task, evaluation.seed.drop_duplicates().tolist())
         comparison = None if plans is None else Comparison(evaluation, plans, self.task.utility)
-        self.time("reference", 0, time.perf_counter() - start)
+        self.time("reference", self.checkpoint_step, time.perf_counter() - start)
         with self._writing():
             if years is not None:
                 with replacing(self.folder / "evaluation_years.csv") as file:

@@ -6,23 +6,18 @@ from importlib.resources import files
 
 import numpy as np
 
-from cleanrl_style.flags import FIRST_EVALUATION_SEED, MAX_ENVS
+from cleanrl_style.flags import FIRST_EVALUATION_SEED
 from cleanrl_style.protocol.task import Task
 
-SPLITS = ("test", "validation", "training")  # results are of the first; variants are chosen on the second
+SPLITS = ("test", "validation")  # results are of the first; variants are chosen on the second
 #: First seed of each, where the task draws no sites.
-FIRST_OF = {"test": FIRST_EVALUATION_SEED, "validation": 2 * FIRST_EVALUATION_SEED, "training": MAX_ENVS}
+FIRST_OF = {"test": FIRST_EVALUATION_SEED, "validation": 2 * FIRST_EVALUATION_SEED}
 TABLE = "evaluation_sites.csv"  # written by analysis/choose_sites.py
 
 
 @functools.cache
 def published_seeds(split: str) -> tuple[int, ...]:
-    """Seeds of a split's episodes; of test and validation every beginning is balanced.
-
-    Training is the first episodes of the environments that `--seed 1` trains on.
-    """
-    if split == "training":
-        return tuple(range(MAX_ENVS, 2 * MAX_ENVS))
+    """Seeds of a split's episodes, of which every beginning is balanced."""
     rows = csv.DictReader((files("cleanrl_style.protocol") / TABLE).read_text(encoding="utf-8").splitlines())
     return tuple(int(row["seed"]) for row in rows if row["split"] == split)
 
@@ -42,8 +37,8 @@ def evaluation_seeds(task: Task, episodes: int, split: str = "test") -> list[int
     """What the environments of an evaluation are reset with, a seed an episode.
 
     The first published sites where the task draws sites, else new weathers of its own site, other ones for each split
-    (site-specific there is but one). Raises ValueError for an
-    unknown split, for no episode, and for more than a split has sites.
+    (site-specific there is but one). Raises ValueError for an unknown split, for no episode, and for more than a split
+    has sites.
     """
     if isinstance(episodes, bool) or not isinstance(episodes, (int, np.integer)) or episodes < 1:
         raise ValueError(f"{episodes} episodes: a whole number, 1 or more, is allowed")

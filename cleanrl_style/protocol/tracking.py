@@ -8,11 +8,14 @@ FOLDERS = ("tensorboard", "wandb")  # of a run's folder, named like the trackers
 
 
 def numbers(table: str, row: dict) -> dict:
-    """The row's numbers, under names such as episodes/carbon_return."""
+    """The row's numbers, under names such as episodes/carbon_return; of validation, with a row a weight at every step,
+    validation/0.5/carbon_gain."""
+    weights = [name for name in row if name.startswith(("preference", "weight_"))] if table == "validation" else []
+    curve = "/".join([table, *(f"{row[name]:g}" for name in weights)])
     return {
-        f"{table}/{name}": float(value)
+        f"{curve}/{name}": float(value)
         for name, value in row.items()
-        if isinstance(value, (int, float, np.number)) and name != "global_step"
+        if isinstance(value, (int, float, np.number)) and name not in ("global_step", *weights)
     }
 
 
