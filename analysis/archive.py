@@ -70,6 +70,9 @@ def archive(runs_dir: Path, archive_dir: Path) -> None:
     """Archive every finished run of a folder; says what it left out, and how large the archive is."""
     if not runs_dir.is_dir():
         protocol.fail(f"--runs-dir {runs_dir}: no such folder")
+    inside = archive_dir.resolve().is_relative_to(runs_dir.resolve())
+    if inside or runs_dir.resolve().is_relative_to(archive_dir.resolve()):
+        protocol.fail(f"--archive-dir {archive_dir}: a folder that is neither in --runs-dir {runs_dir} nor around it")
     paths.make_writable("--archive-dir", archive_dir)
     found, left_out = runs.read_runs(runs_dir)
     for line in left_out:

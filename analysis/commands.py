@@ -7,6 +7,7 @@ It ends with the process that started it (analysis/tied.py), so that none is lef
 import contextlib
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -42,7 +43,7 @@ class Command:
     folder: Path = Path()  # in which it is started
 
     def __str__(self) -> str:
-        return " ".join(["python", os.path.relpath(self.words[0]), *self.words[1:]])
+        return shlex.join(["python", os.path.relpath(self.words[0]), *self.words[1:]])
 
     def tail(self) -> str:
         """The end of its output."""

@@ -203,6 +203,11 @@ def check(evaluation: pd.DataFrame, config: dict) -> None:
         raise ValueError(
             f"damaged: evaluation.csv has {len(evaluation)} episodes of the {primary} policy, not {expected}"
         )
+    episodes = evaluation.groupby(fronts.weight_columns(objectives)).seed.nunique()
+    if len(episodes) != len(arguments["eval_weights"]) or episodes.nunique() != 1:
+        raise ValueError(
+            f"damaged: evaluation.csv lacks episodes of a weight, {len(arguments['eval_weights'])} of them"
+        )
     for what, columns in (
         ("weights", fronts.weight_columns(objectives)),
         ("returns", fronts.return_columns(objectives)),

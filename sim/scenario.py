@@ -96,10 +96,15 @@ def check_scenario(scenario) -> Path | None:
 
 def _check_column(name: str, values, years) -> np.ndarray:
     """Values of a column from `FIRST_YEAR` on. years : of the path's own column, or None."""
+    beside = _years(values)
     if years is None:
-        years = _years(values)
+        years = beside
+    elif beside is not None and not np.array_equal(_plain(years), _plain(beside)):
+        raise ValueError(f"scenario {name}: its own years are others than those of the column {YEAR}")
     if isinstance(values, Mapping):
         values = list(values.values())
+    if np.ma.is_masked(values):
+        raise ValueError(f"scenario {name}: a number for each year is allowed, got a masked one")
     try:
         numbers = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
@@ -135,19 +140,27 @@ def _years(values):
     if isinstance(values, Mapping):
         return list(values)
     index = getattr(values, "index", None)
+    if hasattr(values, "dims") and hasattr(values, "indexes"):  # of xarray
+        index = values.indexes.get(values.dims[0]) if values.dims else None
     if index is None or callable(index):  # a list's index is a method
         return None
     dates = getattr(index, "year", None)
     if dates is not None:
         return dates
-    rows = index.name is None and index.dtype.kind in "if" and (not len(index) or index[0] < LEAST_YEAR)
-    return None if rows else list(index)
+    rows = index.name in (None, *getattr(values, "dims", ())) and index.dtype.kind in "if"
+    return None if rows and (not len(index) or index[0] < LEAST_YEAR) else list(index)
+
+
+def _plain(years) -> np.ndarray:
+    """Years, of dates too, as an array."""
+    found = np.asarray(years)
+    return found.astype("datetime64[Y]").astype(int) + 1970 if found.dtype.kind == "M" else found
 
 
 def _check_years(name: str, given, number: int) -> np.ndarray:
     """The years of a column as integers, one by one, with `FIRST_YEAR` among them."""
     try:
-        years = np.asarray(given, dtype=float)
+        years = np.asarray(_plain(given), dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"scenario {name}: its years have to be integers, got {_no_number(given)!r}") from None
     if years.shape != (number,):

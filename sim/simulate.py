@@ -1,5 +1,7 @@
 """The scientist's door: one stand, given actions, generated or observed weather, a table or a Dataset out."""
 
+from numbers import Real
+
 import numpy as np
 import pandas as pd
 
@@ -134,6 +136,9 @@ def simulate(
     per_year = np.full(years, given) if given.ndim == 0 else given
     check_actions(per_year, years, "years")
     overrides, boundary = _with_boundary(check_mapping("site parameters", site), boundary)
+    for name, value in overrides.items():
+        if np.ndim(value):
+            raise ValueError(f"site: {name} = {value!r}: one number is allowed for one stand")
     if hold_stand:
         overrides |= HELD_STAND
     stand = Stands(
@@ -209,9 +214,10 @@ def _of_forcing(given: dict, forcing: pd.DataFrame) -> dict:
     name = "latitude_deg"
     if name not in told and name not in given:
         raise ValueError(f'{name} is needed: the forcing does not know its place; site={{"{name}": ..}} does')
-    if name in told and isinstance(given.get(name), NUMBER) and abs(given[name] - told[name]) > 1.0:
+    wanted = given.get(name)
+    if name in told and isinstance(wanted, Real) and abs(wanted - told[name]) > 1.0:
         raise ValueError(
-            f"{name} = {given[name]:g}: the forcing is of {told[name]:g}, and the sun has to be that of its place"
+            f"{name} = {float(wanted):g}: the forcing is of {told[name]:g}, and the sun has to be that of its place"
         )
     return {**climate_of(forcing["air_temperature_c"]), **told, **given}
 

@@ -112,6 +112,22 @@ def test_a_file_that_was_cut_short_is_named(tmp_path):
         protocol.load_policy(path)
 
 
+def test_a_bit_that_has_turned_is_seen(tmp_path):
+    path, whole = tmp_path / "turned.pt", policy_file("ppo_group").read_bytes()
+    for at in np.linspace(0.2, 0.8, 5) * len(whole):
+        path.write_bytes(whole[: int(at)] + bytes([whole[int(at)] ^ 16]) + whole[int(at) + 1 :])
+        with pytest.raises(ValueError, match="turned.pt: "):
+            protocol.load_policy(path)
+
+
+def test_a_mask_is_of_truth_values():
+    policy, observation = protocol.load_policy("ppo_group"), np.zeros(105, np.float32)
+    only = np.arange(25) == 12
+    assert policy.act(observation, only) == policy.act(observation, only.astype(int)) == 12
+    with pytest.raises(ValueError, match="a mask has a value that is neither true nor false"):
+        policy.act(observation, np.where(only, 0.0, -np.inf))
+
+
 @pytest.mark.parametrize(
     "damage",
     [

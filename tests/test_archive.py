@@ -102,6 +102,15 @@ def test_a_damaged_archive_is_named(archived):
     assert "damaged: tables.zip" in runs.read_runs(archived)[1][0]
 
 
+@pytest.mark.parametrize("places", [("runs", "runs"), ("runs", "runs/archive"), (".", "runs")])
+def test_an_archive_never_lies_among_the_runs(places, tmp_path):
+    shutil.copytree(TINY_RUNS, tmp_path / "runs")
+    before = files_of(tmp_path)
+    with pytest.raises(SystemExit, match="--archive-dir .*: a folder that is neither in --runs-dir"):
+        archive.archive(*(tmp_path / place for place in places))
+    assert files_of(tmp_path) == before
+
+
 def test_a_folder_that_is_not_there_is_named(tmp_path):
     with pytest.raises(SystemExit, match="--runs-dir .*nope: no such folder"):
         archive.archive(tmp_path / "nope", tmp_path / "archive")

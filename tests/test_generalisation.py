@@ -229,9 +229,7 @@ def test_searched_plans_give_rows_of_their_own(run, tmp_path):
 
 def test_a_split_or_a_run_that_is_not_there(run, tmp_path):
     folder, _ = run
-    with pytest.raises(
-        SystemExit, match="--split hotter: allowed are test, validation, warmer_air, .*, outside"
-    ):
+    with pytest.raises(SystemExit, match="--split hotter: allowed are test, validation, warmer_air, .*, outside"):
         judge(folder, split=("hotter",))
     with pytest.raises(SystemExit, match="--episodes 3: .* was evaluated on 2 of the sites"):
         generalisation.main(generalisation.Args(runs=(folder,), episodes=3))

@@ -8,6 +8,7 @@ import boreal_env
 import sim
 from sim.block import LANES
 from sim.region import many
+from sim.region.store import in_words
 
 pytest.importorskip("zarr")
 xarray = pytest.importorskip("xarray")
@@ -172,6 +173,37 @@ def test_another_simulation_is_not_gone_on_with(tmp_path):
         sim.simulate_many(sites, path=tmp_path / "other", years=1, **COARSE)
 
 
+def test_what_is_simulated_is_told_apart_by_all_of_it(tmp_path):
+    path, prices = pd.DataFrame({"year": np.arange(2025, 2101), "warming_k": 0.0}), tmp_path / "prices.csv"
+    hot = path.assign(warming_k=np.where(np.arange(76) // 10 == 3, 12.0, 0.0))
+    prices.write_text("value\n1")
+    earlier = in_words(str(prices))
+    prices.write_text("value\n2")
+    assert earlier != in_words(str(prices)) == in_words(str(prices))
+
+    def until(year):
+        return lambda observations, masks: observations[:, 1] < year
+
+    gain, loss = (boreal_env.Objective("mine", f) for f in (lambda y: y["a"] / 5, lambda y: -y["a"] / 5))
+    pairs = (
+        (path, hot),
+        (dict(path), dict(hot)),
+        (hot.to_numpy(), path.to_numpy()),
+        (until(1), until(2)),
+        (gain, loss),
+    )
+    for one, other in pairs:
+        assert in_words(one) != in_words(other)
+    assert in_words(until(1)) == in_words(until(1)) and in_words(path) == in_words(path.copy())
+    assert len(in_words(path)) < 250
+
+
+def test_variables_may_come_one_by_one():
+    wanted = (name for name in sim.RECORD_NAMES if name.startswith("biomass"))
+    found = sim.simulate_many(table(2), variables=wanted, years=1, **COARSE)
+    assert set(found.data_vars) == {"biomass_kgc_m2", "biomass_change_kgc_m2", "action"}
+
+
 @pytest.mark.parametrize("name", ["latitude_deg/c/0", "biomass_kgc_m2/c/0/0", "biomass_kgc_m2/zarr.json"])
 def test_a_store_that_is_cut_is_named(name, tmp_path):
     path = tmp_path / "region.zarr"
@@ -328,6 +360,10 @@ def test_gridded_climate(tmp_path):
         (climate().assign_coords(lat=[65.0, 60.0, np.nan]), "coordinate lat has a value that is missing"),
         (climate(relative_humidity=(("lat", "lon"), np.full((3, 3), "damp"))), "has type <U4; numbers are allowed"),
         (5, "climate: a path or an xarray.Dataset is allowed, got int"),
+        (
+            climate(air_temperature_c=(("m", "lat", "lon"), np.tile(np.r_[1, 1, np.nan, [1] * 9], (3, 3, 1)).T)),
+            "air_temperature_c of latitude 60, longitude 20 lacks month 3; all twelve, or none",
+        ),
     ],
 )
 def test_bad_climate(file, message):

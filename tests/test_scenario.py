@@ -100,8 +100,18 @@ def test_a_path_keeps_its_years():
         {name: by_year[name] for name in COLUMNS},
         by_year.set_axis(by_year.index.astype(str)),
         by_year.rename_axis("Year"),
+        table.assign(year=pd.to_datetime(table.year.astype(str))),
     ):
         np.testing.assert_array_equal(check_scenario(own).values, expected)
+
+
+def test_a_dataset_keeps_its_years():
+    pytest.importorskip("xarray")
+    by_year = PATHS["ssp585"].set_index("year")
+    dated = by_year.set_axis(pd.to_datetime(by_year.index.astype(str)).rename("time"))
+    dataset = by_year.to_xarray()
+    for own in (dataset, {name: dataset[name] for name in COLUMNS}, dated.to_xarray()):
+        np.testing.assert_array_equal(check_scenario(own).values, check_scenario("ssp585").values)
 
 
 # ------------------------------------------------------------------------------------------- what a path does
@@ -217,6 +227,11 @@ BAD = {
     "index of rows with a name": (
         pd.DataFrame({"warming_k": [1.0]}, pd.Index([0], name="row")),
         r"its years are 0 to 0; 2025 is needed, too",
+    ),
+    "masked": ({"warming_k": np.ma.array([1.0] * 4, mask=[0, 1, 0, 0])}, r"a number for each year .* got a masked one"),
+    "two kinds of years": (
+        {"year": [2025, 2026], "co2_ppm": pd.Series([400.0, 400.0], [2000, 2001])},
+        r"scenario co2_ppm: its own years are others than those of the column year",
     ),
     "years of another length": ({"warming_k": [1.0] * 4, "year": [2025]}, r"4 values of 1 years; a value each"),
 }

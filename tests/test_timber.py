@@ -1,6 +1,7 @@
 """Timber: logs by diameter, the price table and net revenue by hand, the net present value, what is refused."""
 
 import csv
+import gzip
 import math
 
 import gymnasium as gym
@@ -125,6 +126,17 @@ def test_a_table_of_ones_own(tmp_path):
     assert read_prices(str(path)) == read_prices("sweden")
     write(rows[1:])
     with pytest.raises(ValueError, match="sawlog_conifer missing; all of"):
+        read_prices(path)
+    text = path.read_text()
+    for change, message in (
+        (lambda text: text.replace("value", "value,value", 1), "line 1: column value is there twice"),
+        (lambda text: text.rstrip() + ",8\n", "it has more fields than line 1 has names"),
+    ):
+        path.write_text(change(text))
+        with pytest.raises(ValueError, match=message):
+            read_prices(path)
+    path.write_bytes(gzip.compress(text.encode()))
+    with pytest.raises(ValueError, match="prices.csv': a table as text is allowed, and it is packed"):
         read_prices(path)
     write([*rows, rows[0]])
     with pytest.raises(ValueError, match="sawlog_conifer comes twice"):

@@ -256,8 +256,13 @@ def main(args: Args) -> None:
     name, env_id, policy = policy_of(args)
     if env_id not in boreal_env.REGISTERED:
         protocol.fail(f"--env-id {env_id}: allowed are {', '.join(boreal_env.REGISTERED)}")
+    if boreal_env.REGISTERED[env_id]["mode"] != "generalist":
+        protocol.fail(f"--env-id {env_id}: it is of one site; a generalist's is allowed")
     world = {key: value for key, value in gym.spec(env_id).kwargs.items() if key != "mode"}
-    table = study(args, name, world, policy, paths.runs(args.quick) / "boreal_map")
+    try:
+        table = study(args, name, world, policy, paths.runs(args.quick) / "boreal_map")
+    except ValueError as error:  # of a climate file, or of an address
+        protocol.fail(f"--{error}")
     settings = {
         "policy": name,
         "env_id": env_id,

@@ -94,6 +94,8 @@ def main(args: Args) -> None:
     """Play, or take what was played before; write the table and the picture."""
     paths.make_writable("--path", args.path.parent)
     task = protocol.Task.of(args.env_id, site_seed=args.site_seed)
+    if task.num_objectives != 2:
+        protocol.fail(f"--env-id {args.env_id}: an environment of two objectives is allowed")
     front, choices = study(task, protocol.evaluation_seeds(task, 1))
     print(front.to_string(index=False, float_format="%.3f"))
     path = paths.studies() / "concave_front.csv"

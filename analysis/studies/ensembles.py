@@ -30,7 +30,7 @@ LEAST = 1e-12  # a probability of 0 would be a veto of one for all
 class Args:
     """Measures what averaged policies gain."""
 
-    episodes: int = 200
+    eval_episodes: int = 200
     """evaluation episodes per weight"""
     quick: bool = False
     """2 episodes, all seeds together: to see that it runs, into results/quick/studies"""
@@ -74,7 +74,7 @@ def path(quick: bool = False) -> Path:
 
 def main(args: Args) -> None:
     """Play every set on both tasks, and write the table."""
-    episodes = 2 if args.quick else args.episodes
+    episodes = 2 if args.quick else args.eval_episodes
     archive = paths.there(paths.archive())
     there = {task_id: policies_of(archive / SCRIPT / f"{task_id}-vectorization=lockstep") for task_id in TASKS}
     digest = hashlib.sha256(b"".join(file.read_bytes() for files in there.values() for file in files.values()))

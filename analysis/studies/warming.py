@@ -421,6 +421,8 @@ def main(args: Args) -> None:
     years, plans = YEARS, PLANS
     if args.quick:
         args, years, plans = replace(args, sites=3), 6, [0, boreal_env.NO_CHANGE, 20, 24]
+    if args.sites == Args.sites and not PAGE.parent.is_dir():
+        protocol.fail(f"{PAGE}: no such folder here; this is run in the project's folder")
     folder = paths.studies(args.quick)
     made_by = {"sites": args.sites, "years": years, "plans": plans, "physics": open_loop.fingerprint()}
     tables = [folder / "warming.csv", folder / "warming_years.csv"]
@@ -430,7 +432,11 @@ def main(args: Args) -> None:
         for path, table in zip(tables, study(args, years, plans), strict=True):
             stored.write(path, table, made_by)
             print(f"wrote {path}")
-    if not args.quick:
+    if args.quick:
+        return
+    if args.sites != Args.sites:
+        print(f"{PAGE} is of {Args.sites} sites and stays as it is")
+    else:
         of_plans, of_years = (stored.read(path) for path in tables)
         PAGE.write_text(page(of_plans, of_years), encoding="utf-8")
         draw(of_plans, of_years, FIGURE)

@@ -5,6 +5,7 @@ import importlib.util
 import json
 import pickle
 import sys
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -46,6 +47,8 @@ class Policy:
         mask : valid actions, bool, `env.unwrapped.action_masks()`. accrued_returns : (m,) or (n, m), the rewards of the
         episode so far, which EUPG's policies look at. generator : draws the action instead.
         """
+        if np.asarray(mask).dtype != bool and not np.isin(mask, (0, 1)).all():
+            raise ValueError(f"{self.name}: a mask has a value that is neither true nor false")
         observations, masks = np.atleast_2d(np.asarray(observation, np.float32)), np.atleast_2d(np.asarray(mask, bool))
         if observations.shape[1] != self.size or masks.shape != (len(observations), 25):
             raise ValueError(
@@ -101,6 +104,10 @@ def load_policy(run_or_name, script=None) -> Policy:
         raise ModuleNotFoundError('load_policy needs torch: pip install -e ".[train]"', name="torch") from error
 
     try:
+        with zipfile.ZipFile(path) as archive:
+            damaged = archive.testzip()  # torch does not look at the checksums that it wrote
+        if damaged:
+            raise ValueError(f"damaged: {damaged}")
         saved = torch.load(path, weights_only=True)
         run = saved.get("run") or json.loads((path.parent / "config.json").read_text(encoding="utf-8"))
         _check_run(saved, run)
@@ -116,8 +123,8 @@ def load_policy(run_or_name, script=None) -> Policy:
         raise ValueError(f"{path}: no policy that a script of this project has written") from error
     except FileNotFoundError as error:
         raise FileNotFoundError(f"{path}: config.json of its run has to lie beside it") from error
-    except OSError as error:  # a file that was cut short is no file to torch
-        raise ValueError(f"{path}: cut short or not readable ({error.strerror})") from error
+    except (OSError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path}: cut short or not readable ({error})") from error
     module = _script_module(run["script"], script)
     space = Box(-np.inf, np.inf, tuple(saved["observation_shape"]), np.float32)
     lacking = [part for part in ("Agent", "make_policy") if not hasattr(module, part)]

@@ -96,6 +96,8 @@ def check(args: argparse.Namespace) -> None:
         raise ValueError(f"--out {args.out}: there is no folder {args.out.parent}")
     if args.out is not None and args.out.suffix.lower() != ".gif":
         raise ValueError(f"--out {args.out}: a file that ends in .gif is allowed")
+    if args.window and args.out is not None:
+        raise ValueError(f"--out {args.out}: with --window no GIF is written")
     if args.window:
         check_display()
     else:
@@ -105,10 +107,11 @@ def check(args: argparse.Namespace) -> None:
 def check_display() -> None:
     """Refuse a window where there is none to be had, before years are played for it."""
     import matplotlib.pyplot as plt
+    from matplotlib.backends import BackendFilter, backend_registry
 
     try:
         plt.switch_backend(plt.get_backend())
-        found = plt.get_backend().lower() != "agg"
+        found = plt.get_backend().lower() not in backend_registry.list_builtin(BackendFilter.NON_INTERACTIVE)
     except ImportError:
         found = False
     if not found:

@@ -167,6 +167,8 @@ def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, spli
     Returns the table of episodes (`evaluation_columns`; with a thaw formulation other than asymmetric also ASYMMETRIC)
     and the statistics of the annual record over the episodes of each weight (None if there is no such record).
     """
+    if not callable(policy):
+        raise ValueError(f"policy {policy!r}: a function is allowed, such as protocol.load_policy gives")
     weights = check_asked(task, weights, policies)
     numbers = episodes_by_policy(task, episodes, policies)
     task, seeds = of_split(task, episodes, split)
@@ -216,6 +218,8 @@ def check_asked(task: Task, weights, policies) -> list[np.ndarray]:
         raise ValueError(f"task {task!r}: protocol.Task.of(env_id) gives one")
     if isinstance(policies, str) or not len(policies) or not set(policies) <= set(POLICIES):
         raise ValueError(f"policies {policies!r}: a list or tuple of {', '.join(POLICIES)} is allowed")
+    if len(set(policies)) < len(policies):
+        raise ValueError(f"policies {policies!r}: each is allowed once")
     if not np.iterable(weights) or not len(weights):
         raise ValueError(f"weights {weights!r}: a list of at least one is allowed")
     found = [task.check_weights(value) for value in weights]

@@ -264,6 +264,8 @@ class Run:
             table = self.folder / f"{name}.csv"
             if not table.exists() or table.stat().st_size < size:
                 fail(f"{table} is shorter than when the checkpoint was written; --overwrite starts over")
+            if table.read_bytes()[size - 1 : size] != b"\n":
+                fail(f"{table} is not as it was when the checkpoint was written; --overwrite starts over")
         if checkpoint["envs"] is None:
             print(f"{self.args.env_id} gives no state to go on from: the interrupted run starts over", flush=True)
             return

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cleanrl_style.flags import fail
+
 FOLDERS = ("tensorboard", "wandb")  # of a run's folder, named like the trackers
 
 
@@ -47,14 +49,17 @@ def wandb(args, script, folder, config, first_step):
     import wandb
 
     identity = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()[:16]
-    wandb.init(
-        project=args.wandb_project_name,
-        name=f"{script}-{args.env_id}-{args.seed}",
-        config=config,
-        dir=str(folder),
-        id=identity,
-        resume="allow",
-    )
+    try:
+        wandb.init(
+            project=args.wandb_project_name,
+            name=f"{script}-{args.env_id}-{args.seed}",
+            config=config,
+            dir=str(folder),
+            id=identity,
+            resume="allow",
+        )
+    except wandb.errors.UsageError as error:  # no login
+        fail(f"--track wandb: {str(error).splitlines()[0]}")
 
     def track(table: str, row: dict) -> None:
         wandb.log({"global_step": row["global_step"], **numbers(table, row)})

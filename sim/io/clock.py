@@ -49,7 +49,7 @@ def read_times(table: Table, texts: pd.Series, name: str, *, zone: bool = True) 
         if row == 0 and not any(letter.isdigit() for letter in str(value)):
             hint = "; rows of units below the names have to be removed"
         elif _DAY_FIRST.match(str(value)):
-            hint = "; of days first: read it by pandas, its times by pd.to_datetime(.., dayfirst=True)"
+            hint = "; of days or months first: read it by pandas, its times by pd.to_datetime(.., format=..)"
         raise ValueError(
             f"{table.where(row)}: {name} is {value!r}; a time as 201906031230 or 2019-06-03 12:30 is allowed{hint}"
         )

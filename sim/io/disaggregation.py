@@ -23,6 +23,7 @@ declination = uncompiled(solar_declination)
 #: What a daily record may have its humidity as; the first that is there is taken.
 HUMIDITY = ("vapour_pressure_hpa", "vapour_pressure_deficit_hpa", "relative_humidity")
 STEPS_PER_DAY = 48
+MOST_HALF_RANGE = 0.1  # K per W m-2 of the day's mean light: 30 K on a clear day
 NUMBER = (int, float, np.number)
 #: Column -> kind of `LIMITS`, between which its values lie; light and rain from 0 on, as the simulator takes them.
 KINDS = {
@@ -45,14 +46,14 @@ HOURS = (np.arange(STEPS_PER_DAY) + 0.5) * 24.0 / STEPS_PER_DAY  # local solar t
 class DiurnalCycle:
     """The solar cycle of air temperature: half-range per mean shortwave of the day [K (W m-2)-1], hour of its peak.
 
-    Raises ValueError for a half-range below 0, an hour outside [0, 24), and what is no number.
+    Raises ValueError for a half-range outside [0, 0.1), an hour outside [0, 24), and what is no number.
     """
 
     half_range_per_shortwave: float
     peak_hour: float
 
     def __post_init__(self):
-        for name, high in (("half_range_per_shortwave", math.inf), ("peak_hour", 24.0)):
+        for name, high in (("half_range_per_shortwave", MOST_HALF_RANGE), ("peak_hour", 24.0)):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, NUMBER) or not 0.0 <= value < high:
                 raise ValueError(f"{name} = {value!r}: a number in [0, {high:g}) is allowed")

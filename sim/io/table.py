@@ -1,5 +1,6 @@
 """The rows of a record, from a file or from memory, and how an error names one of them."""
 
+import csv
 import gzip
 import re
 import zlib
@@ -123,7 +124,7 @@ def _csv(path: Path) -> Table:
     if not header.strip():
         raise ValueError(f"forcing: {path.name}, line {comments + 1}: a row of column names is needed, got nothing")
     separator = max(",;\t", key=header.count)
-    columns = [name.strip().strip('"') for name in header.rstrip("\r\n").split(separator)]
+    columns = [name.strip() for name in next(csv.reader([header.rstrip("\r\n")], delimiter=separator))]
     at = f"forcing: {path.name}, line {comments + 1}"
     if all(re.fullmatch(r"[-+.\d][-+.:\d eTZ]*", name) for name in columns):
         raise ValueError(f"{at}: a row of column names is needed, got numbers, {', '.join(columns[:3])}")
@@ -172,6 +173,8 @@ def _check_fields(path: Path, separator: str, most: int, above: int) -> None:
                 )
             if number > above and line.count('"') % 2 and opens.search(line):
                 raise ValueError(f"forcing: {path.name}, line {number}: a quote is opened and not closed in its line")
+            if not line.endswith(("\n", "\r")) and line.strip() and line.count(separator) + 1 < most:
+                raise ValueError(f"forcing: {path.name}, line {number}: the file ends within a row; it was cut short")
 
 
 def _is_time(name: str) -> bool:

@@ -43,7 +43,12 @@ def check_axis(name: str, values) -> np.ndarray:
     low, high, unit = COLUMNS[name]
     try:
         numbers = np.unique(np.asarray(values, dtype=float))
-        allowed = np.ndim(values) == 1 and len(numbers) and ((numbers >= low) & (numbers <= high)).all()
+        allowed = (
+            not np.ma.is_masked(values)
+            and np.ndim(values) == 1
+            and len(numbers)
+            and ((numbers >= low) & (numbers <= high)).all()
+        )
     except (TypeError, ValueError):  # text, or rows of several lengths
         allowed = False
     if allowed and len(numbers) < len(values):
@@ -95,6 +100,8 @@ def climate_at(climate, latitude: np.ndarray, longitude: np.ndarray) -> pd.DataF
         if grid[name].dtype.kind not in "iuf":
             raise ValueError(f"climate: {name} has type {grid[name].dtype}; numbers are allowed")
         values = nearest(grid[name], points).transpose("point", ...).to_numpy().astype(float)
+        if name == MONTHLY:
+            check_months(values, latitude, longitude)
         columns |= dict(zip(CLIMATE, mean_and_amplitude(values), strict=True)) if name == MONTHLY else {name: values}
     if not columns:
         raise ValueError("climate: it has no variable")
@@ -132,6 +139,18 @@ def nearest(values, points: dict):
     return values.sel(
         {name: xarray.DataArray(wanted, dims=dim) for name, (dim, wanted) in points.items()}, method="nearest"
     )
+
+
+def check_months(months: np.ndarray, latitude: np.ndarray, longitude: np.ndarray) -> None:
+    """Refuse a point that has some of the twelve months (points, 12) and not all."""
+    missing = np.isnan(months)
+    some = missing.any(axis=1) & ~missing.all(axis=1)
+    if some.any():
+        k = int(np.argmax(some))
+        raise ValueError(
+            f"climate: {MONTHLY} of latitude {latitude[k]:g}, longitude {longitude[k]:g} lacks month "
+            f"{int(np.argmax(missing[k])) + 1}; all twelve, or none, are allowed"
+        )
 
 
 def mean_and_amplitude(months: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

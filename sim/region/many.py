@@ -23,7 +23,7 @@ from sim.management import NUM_ACTIONS, as_array, check_actions
 from sim.parameters import check_name
 from sim.region.plan import Plan
 from sim.region.site_table import SEED, check_sites
-from sim.region.store import Store, digest
+from sim.region.store import Store, code_of, digest, name_of
 from sim.spin_up import BOUNDARY, INITIAL_LIMITS
 from sim.stands import check_threads
 from sim.task.actions import NO_CHANGE
@@ -52,7 +52,7 @@ NOT_OF_MANY = ("mode", "years", "site_seed", "fixed_preference", "parameter_over
 #: Arguments of the world that a policy was trained in, and may have to be told again.
 WORLD = ("weather", "boundary", "soil_carbon", "scenario")
 
-PROBES = 256
+PROBES, MOST_PROBED = 256, 5.0  # observations and returns, the latter up to so much, by which policies are told apart
 CHUNK_STAND_YEARS, LARGEST_CHUNK = 51_200, 4096  # a chunk: half a minute on two cores, and 0.2 GB
 TELL_SECONDS = 10.0
 
@@ -270,8 +270,7 @@ def check_choice(actions, label: str | None, sites: int, one: Episodes) -> tuple
             allowed = "a function of observations and valid actions, and of returns if it asks for them, is allowed"
             raise ValueError(f"policy: {allowed}; {error}") from None
         done = digest(choose(actions, *probes(one)).astype(np.int64))
-        name = getattr(actions, "__qualname__", type(actions).__qualname__)
-        return actions, label or f"{getattr(actions, '__module__', '')}.{name} {done}"
+        return actions, label or f"{name_of(actions)} {done} {code_of(actions)}"
     if isinstance(actions, str):
         raise ValueError(f"actions {actions!r}: a policy is allowed, which cleanrl_style.protocol.load_policy loads")
     given = as_array(actions)
@@ -290,13 +289,15 @@ def probes(one: Episodes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     space = one.observation_space
     shares = np.random.default_rng(0).random((PROBES, len(space.low)), np.float32)
     observations = space.low + shares * (space.high - space.low)
-    return observations, np.ones((PROBES, NUM_ACTIONS), bool), np.zeros((PROBES, len(one.objective_names)))
+    returns = np.random.default_rng(1).uniform(-MOST_PROBED, MOST_PROBED, (PROBES, len(one.objective_names)))
+    return observations, np.ones((PROBES, NUM_ACTIONS), bool), returns
 
 
 def check_variables(variables, names) -> tuple[str, ...]:
     """Columns of the annual record, each once."""
-    if isinstance(variables, str) or not np.iterable(variables) or not len(tuple(variables)):
+    wanted = () if isinstance(variables, str) or not np.iterable(variables) else tuple(variables)
+    if not wanted:
         raise ValueError(f"variables: a sequence of names is allowed, got {variables!r}")
-    for name in variables:
+    for name in wanted:
         check_name("variable", name, names)
-    return tuple(dict.fromkeys(variables))
+    return tuple(dict.fromkeys(wanted))

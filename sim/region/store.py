@@ -1,11 +1,15 @@
 """The zarr store of a region: written chunk by chunk, gone on with where it was killed."""
 
+import dataclasses
+import functools
 import hashlib
 import json
 import os
 import re
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -20,6 +24,8 @@ try:
     import fcntl
 except ImportError:  # Windows, where a store is not locked
     fcntl = None  # type: ignore[assignment]
+
+LONGEST_WORDS = 200  # letters of an argument in the store's settings; of more a hash
 
 
 class Store:
@@ -45,7 +51,7 @@ class Store:
             "others": plan.others,
             "preference": plan.weights.tolist(),
             "variables": list(plan.variables),
-            "arguments": {name: without_addresses(value) for name, value in sorted(plan.arguments.items())},
+            "arguments": {name: in_words(value) for name, value in sorted(plan.arguments.items())},
         }
         self.path: Any = None if path is None else Path(path)
         self.partial: Any = None if path is None else Path(path).with_name(Path(path).name + ".partial")
@@ -201,9 +207,55 @@ def digest(*arrays: np.ndarray) -> str:
     return found.hexdigest()[:16]
 
 
-def without_addresses(value) -> str:
-    """What an argument is, in words that are the same in every process."""
+def in_words(value) -> str:
+    """What an argument is, in words that are the same in every process and others for another value: of a table all of
+    its numbers, of a file its content, of a function its code.
+    """
+    words = _in_words(value)
+    return words if len(words) <= LONGEST_WORDS else f"{words[:LONGEST_WORDS]}.. {digest(np.array(words))}"
+
+
+def _in_words(value) -> str:
+    if isinstance(value, (str, Path)) and Path(value).is_file():
+        return f"{value} {hashlib.sha256(Path(value).read_bytes()).hexdigest()[:16]}"
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    elif hasattr(value, "to_dict"):  # of pandas and xarray, whose repr leaves most out
+        value = value.to_dict()
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key!r}: {_in_words(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_in_words, value)) + "]"
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return type(value).__name__ + _in_words({f.name: getattr(value, f.name) for f in dataclasses.fields(value)})
+    if callable(value):
+        return f"{name_of(value)} {code_of(value)}"
     return re.sub(r" at 0x[0-9a-f]+", "", repr(value))
+
+
+def name_of(function) -> str:
+    """A function's name, or that of a callable's class."""
+    return f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', type(function).__qualname__)}"
+
+
+def code_of(function) -> str:
+    """Hash of what a function does: its code, defaults, and what it has from around it; of a partial function of both
+    parts.
+    """
+    if isinstance(function, functools.partial):
+        return code_of(function.func) + in_words([function.args, function.keywords])
+    code = getattr(function, "__code__", None) or getattr(type(function).__call__, "__code__", None)
+    around = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
+    of_it = [_code(code), in_words(getattr(function, "__defaults__", None)), *map(in_words, around)]
+    return hashlib.sha256(repr(of_it).encode()).hexdigest()[:16]
+
+
+def _code(code) -> list:
+    """Instructions and constants of a code object and of those in it."""
+    if code is None:  # compiled
+        return []
+    constants = [_code(one) if isinstance(one, CodeType) else repr(one) for one in code.co_consts]
+    return [code.co_code, code.co_names, constants]
 
 
 def simulator() -> str:

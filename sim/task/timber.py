@@ -115,15 +115,24 @@ def rows_of(path: Path) -> list[dict]:
     try:
         check_utf8(what, path)
         text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:  # packed
+        raise ValueError(f"{what}: a table as text is allowed, and it is packed") from None
     except OSError as error:
         raise ValueError(f"{what}: cannot be read ({error.strerror})") from None
     reader = csv.DictReader(text.splitlines(keepends=True))
-    missing = [name for name in READ if name not in (reader.fieldnames or ())]
+    names = list(reader.fieldnames or ())
+    for name in READ:
+        if names.count(name) > 1:
+            raise ValueError(f"{what}, line 1: column {name} is there twice")
+    missing = [name for name in READ if name not in names]
     if missing:
         raise ValueError(
             f"{what}, line 1: column {missing[0]} is missing; {', '.join(READ)} are needed, separated by commas"
         )
     rows = [{**row, "line": reader.line_num} for row in reader]
+    for row in rows:
+        if None in row:  # more fields than names: of a decimal comma
+            raise ValueError(f"{what}, line {row['line']}: it has more fields than line 1 has names")
     return [row for row in rows if any(row[name] for name in READ)]
 
 
@@ -166,7 +175,7 @@ def in_eur(where: str, row: dict) -> float:
         raise ValueError(f"{where}: {item} has the value {row['value']}; a finite number, not negative, is allowed")
     if not 0.0 < numbers["per_eur"] < np.inf:
         raise ValueError(f"{where}: {item} has the per_eur {row['per_eur']}; a positive number is allowed")
-    if row["currency"] == "EUR" and numbers["per_eur"] != 1.0:
+    if row["currency"].upper() == "EUR" and numbers["per_eur"] != 1.0:
         raise ValueError(f"{where}: {item} is in EUR and has the per_eur {row['per_eur']}; 1 is allowed")
     return numbers["value"] * UNITS[unit] / numbers["per_eur"]
 
