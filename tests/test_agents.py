@@ -108,7 +108,7 @@ def test_a_folder_without_a_policy_is_named(tmp_path):
 def test_a_file_that_was_cut_short_is_named(tmp_path):
     path = tmp_path / "cut.pt"
     path.write_bytes(policy_file("ppo_group").read_bytes()[:5000])
-    with pytest.raises(ValueError, match="cut.pt: cut short or not readable"):
+    with pytest.raises(ValueError, match="cut.pt: cut short, or no policy"):
         protocol.load_policy(path)
 
 

@@ -558,7 +558,7 @@ BAD = {
     ),
     "a time of days first": (
         with_times(lambda t: ["31.12.2019 12:00"], [3000]),
-        r"row 3000: TIMESTAMP_START is '31.12.2019 12:00'; .*of days first: read it by pandas",
+        r"row 3000: TIMESTAMP_START is '31.12.2019 12:00'; .*of days or months first: read it by pandas",
     ),
     "a time that is missing": (
         with_times(lambda t: [None], [3000]),

@@ -124,7 +124,8 @@ def load_policy(run_or_name, script=None) -> Policy:
     except FileNotFoundError as error:
         raise FileNotFoundError(f"{path}: config.json of its run has to lie beside it") from error
     except (OSError, zipfile.BadZipFile) as error:
-        raise ValueError(f"{path}: cut short or not readable ({error})") from error
+        what = "cut short, or no policy that a script of this project has written"
+        raise ValueError(f"{path}: {what} ({error})") from error
     module = _script_module(run["script"], script)
     space = Box(-np.inf, np.inf, tuple(saved["observation_shape"]), np.float32)
     lacking = [part for part in ("Agent", "make_policy") if not hasattr(module, part)]
