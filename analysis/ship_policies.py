@@ -35,7 +35,7 @@ class Args:
 
 def name_of(run: dict) -> str:
     """A policy's name, of its run's script and arguments."""
-    task = run["arguments"]["env_id"].removeprefix("boreal-").removesuffix("-v0")
+    task = run["arguments"]["env_id"].split(":")[-1].removeprefix("boreal-").removesuffix("-v0").replace("/", "-")
     return run["script"] + ("" if task == "generalist" else f"-{task}")
 
 
@@ -56,6 +56,8 @@ def main(args: Args) -> None:
         # parameters are views of one tensor, which would be saved whole
         kept = {key: value.clone() for key, value in saved["agent"].items() if not key.startswith("critic.")}
         saved["agent"] = kept
+        if "run" not in saved:
+            sys.exit(f"error: {path}: a policy file that names its run is allowed, as run.save_policy writes it")
         buffer, name = io.BytesIO(), name_of(saved["run"])
         torch.save(saved, buffer)
         if len(buffer.getvalue()) > LARGEST:

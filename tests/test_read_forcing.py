@@ -560,6 +560,10 @@ BAD = {
         with_times(lambda t: ["31.12.2019 12:00"], [3000]),
         r"row 3000: TIMESTAMP_START is '31.12.2019 12:00'; .*of days or months first: read it by pandas",
     ),
+    "an index that is a column, too": (
+        lambda: tower(lambda t: t.set_index("TIMESTAMP_START", drop=False)),
+        "forcing: the table: TIMESTAMP_START is there twice, as the index and as a column",
+    ),
     "a time that is missing": (
         with_times(lambda t: [None], [3000]),
         r"row 3000: TIMESTAMP_START is (None|nan); a time as",

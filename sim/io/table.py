@@ -55,7 +55,7 @@ def open_table(source) -> Table:
     """A CSV file (also packed as .gz), a NetCDF file, a DataFrame, or an xarray Dataset of one place."""
     if isinstance(source, pd.DataFrame):
         return _in_memory(source, "the table")
-    if hasattr(source, "to_dataframe"):
+    if hasattr(source, "data_vars"):
         return _of_one_place(source, "the dataset")
     if not isinstance(source, (str, Path)):
         raise ValueError(f"forcing: a file, a DataFrame or a Dataset is allowed, got {type(source).__name__}")
@@ -132,7 +132,7 @@ def _csv(path: Path) -> Table:
         raise ValueError(f"{at}: columns separated by comma, semicolon or tab are allowed, got {header.strip()!r}")
     twice = [name for k, name in enumerate(columns) if name in columns[:k]]
     if twice:
-        raise ValueError(f"{at}: column {twice[0]} is there twice")
+        raise ValueError(f"{at}: column {twice[0] or '(without a name)'} is there twice")
 
     _check_fields(path, separator, len(columns), comments)
 
@@ -183,6 +183,9 @@ def _is_time(name: str) -> bool:
 
 def _in_memory(frame: pd.DataFrame, name: str) -> Table:
     if frame.index.name is not None or isinstance(frame.index, (pd.DatetimeIndex, pd.MultiIndex)):
+        both = {*map(str, frame.columns)} & {str(level or "time") for level in frame.index.names}
+        if both:
+            raise ValueError(f"forcing: {name}: {min(both)} is there twice, as the index and as a column")
         frame = frame.reset_index(names="time" if frame.index.name is None and frame.index.nlevels == 1 else None)
     frame = frame.reset_index(drop=True)
     columns = [str(column) for column in frame.columns]
