@@ -117,7 +117,8 @@ def test_the_splits_of_sites_and_the_policies_on_them(tmp_path):
     """Two sites; outside the greedy policy has half of its ratios on one."""
     results = Results((tmp_path,), experiments.jobs(), tmp_path)
     table = document_results.section(results, "splits")
-    assert "| `training` | 1000 to 1999 |" in table and "| `test` | 200 of `evaluation_sites.csv` |" in table
+    assert "| `validation` | 100 of `evaluation_sites.csv` |" in table
+    assert "| `test` | 200 of `evaluation_sites.csv` |" in table
     assert "| `calmer` | those of `test` | `wind_speed_m_s` 0.4 to 1 (sampled: 1 to 5) |" in table
     assert document_results.section(results, "generalisation").startswith("Not run yet: `python analysis/gen")
 
