@@ -262,8 +262,9 @@ class BorealEnv(Described, gym.Env, EzPickle):
 
     ## Saving
     `get_state()` has everything that the future depends on, the running episode and the generators; `set_state` gives
-    it to another environment with the same arguments. `pickle` and `copy.deepcopy` keep the arguments alone: their copy
-    has to be reset, or given the state.
+    it to another environment with the same arguments. One of `gym.make` is asked as `env.unwrapped`, and counts as
+    begun only after a `reset`. `pickle` and `copy.deepcopy` keep the arguments alone: their copy has to be reset, or
+    given the state.
 
     ## Credits
     After BoreaRL (Dsouza et al. 2025, arXiv 2509.19846).
