@@ -226,8 +226,8 @@ def choices_of(script: str, *experiments_: str):
     """A script with one choice changed less its default, bold where the interval of five seeds and more lacks 0."""
 
     def written(results: Results) -> str:
-        table = choices.make(results)
-        table = table[(table.method == script) & (table.seeds > 0)]
+        table = choices.make(results, script)
+        table = table[table.seeds > 0]
         if not has_numbers(table, choices.COLUMNS):
             return not_run("main", "balanced", *experiments_)
         decimals = {"score_greedy": 1, "score_sampled": 1} | dict.fromkeys(choices.CHANGES, 2)

@@ -194,7 +194,13 @@ def test_what_is_simulated_is_told_apart_by_all_of_it(tmp_path):
     )
     for one, other in pairs:
         assert in_words(one) != in_words(other)
-    assert in_words(until(1)) == in_words(until(1)) and in_words(path) == in_words(path.copy())
+
+    def recursive(year):
+        return year in {"a", "b"} or (year > 0 and recursive(year - 1))
+
+    assert in_words(until(1)) == in_words(until(1)) and in_words(recursive) == in_words(recursive)
+    assert in_words({"b", "a"}) == in_words({"a", "b"}) == "['a', 'b']"
+    assert in_words(path) == in_words(path.copy())
     assert len(in_words(path)) < 250
 
 

@@ -262,7 +262,7 @@ def main(args: Args) -> None:
     try:
         table = study(args, name, world, policy, paths.runs(args.quick) / "boreal_map")
     except ValueError as error:  # of a climate file, or of an address
-        protocol.fail(f"--{error}")
+        protocol.fail(str(error))
     settings = {
         "policy": name,
         "env_id": env_id,

@@ -44,10 +44,11 @@ def score_difference(pairs: list[tuple], policy: str) -> tuple[float, float, flo
     return metrics.score_interval(pd.DataFrame(sites), metrics.plans_of_sites(plans, weights))
 
 
-def make(results) -> pd.DataFrame:
-    """One row per changed choice."""
+def make(results, only: str | None = None) -> pd.DataFrame:
+    """One row per changed choice; only : of one script."""
     rows = []
-    for key in dict.fromkeys(job.row for job in results.jobs if job.experiment in EXPERIMENTS):
+    wanted = [job for job in results.jobs if job.experiment in EXPERIMENTS and only in (None, job.script)]
+    for key in dict.fromkeys(job.row for job in wanted):
         script, env_id, _ = key
         changed = by_seed(results.rows[key])
         default = by_seed(results.of({GENERALIST: "main", BALANCED: "balanced"}[env_id], script))

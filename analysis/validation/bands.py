@@ -71,7 +71,7 @@ def _permafrost_text(runs: dict[str, Run], balanced: dict[str, Run]) -> str:
     ]
     header = ["", *(f"{kind}: {what}" for kind in (FOREST, "open") for what in ("permafrost", "thaws to [m]"))]
     return f"""Sites with permafrost, ground whose mean over the years stays below 0 degC where thaw is deepest, and the
-median of that depth on them. Balanced ground has the observed weather, too.
+median of that depth on them. The balanced world has the weather of the records, too.
 
 {document.table(header, rows, left=1)}"""
 

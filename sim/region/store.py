@@ -224,6 +224,8 @@ def _in_words(value) -> str:
         value = value.to_dict()
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key!r}: {_in_words(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, (set, frozenset)):  # whose order differs from process to process
+        value = sorted(value, key=repr)
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_in_words, value)) + "]"
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
@@ -246,6 +248,7 @@ def code_of(function) -> str:
         return code_of(function.func) + in_words([function.args, function.keywords])
     code = getattr(function, "__code__", None) or getattr(type(function).__call__, "__code__", None)
     around = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
+    around = [one for one in around if one is not function]  # which calls itself
     of_it = [_code(code), in_words(getattr(function, "__defaults__", None)), *map(in_words, around)]
     return hashlib.sha256(repr(of_it).encode()).hexdigest()[:16]
 
@@ -254,7 +257,7 @@ def _code(code) -> list:
     """Instructions and constants of a code object and of those in it."""
     if code is None:  # compiled
         return []
-    constants = [_code(one) if isinstance(one, CodeType) else repr(one) for one in code.co_consts]
+    constants = [_code(one) if isinstance(one, CodeType) else _in_words(one) for one in code.co_consts]
     return [code.co_code, code.co_names, constants]
 
 
