@@ -24,7 +24,8 @@ from analysis.results import Results
 from analysis.studies import ensembles
 from analysis.tables import best_known, choices, main_results, runtime, single_sites
 from analysis.tables import learning_difficulty as difficulty_table
-from analysis.tables.common import has_numbers, over_seeds
+from analysis.tables.common import has_numbers, over_seeds, score_text
+from analysis.tables.thaw_formulations import under_asymmetric
 from cleanrl_style import protocol
 from cleanrl_style.protocol import sites
 from sim.task.shifts import SHIFTS, shifts_of
@@ -82,10 +83,20 @@ def line(title: str, replicates: list, published: float = np.nan, trained: bool 
     """A row of the table: interquartile means over training seeds with 95 % intervals, and the paper's return."""
     shown = [*RETURNS, "gain_hypervolume"]
     table = pd.DataFrame([numbers(one.evaluation, one.gains) for one in replicates], columns=shown)
-    cells = cells_of(over_seeds(table) | main_results.scores(replicates), COLUMNS)
+    values = over_seeds(table) | main_results.scores(replicates)
+    if replicates and len(np.unique(metrics.weights_of(replicates[0].evaluation), axis=0)) <= len(ENDS):
+        # a mean over the ends alone is no mean over the preferences
+        values = {name: value for name, value in values.items() if "gain" not in name and "scalarized" not in name}
+    cells = cells_of(values, COLUMNS)
     cells.append("" if np.isnan(published) else f"{published:.2f}")
-    seeds = str(len(table) or "not run yet") if trained else ""
+    seeds = trainings(replicates) if trained else ""
     return f"| {title} | {seeds} | " + " | ".join(cells) + " |\n"
+
+
+def trainings(replicates: list) -> str:
+    """How many training seeds a row has; of trainings on single sites how many sites, each with a seed of its own."""
+    sites = {one.runs[0].arguments.get("site_seed") for one in replicates}
+    return f"{len(replicates)} sites" if len(sites) > 1 else str(len(replicates) or "not run yet")
 
 
 def cells_of(values: dict, columns: dict[str, int]) -> list[str]:
@@ -93,6 +104,9 @@ def cells_of(values: dict, columns: dict[str, int]) -> list[str]:
     cells = []
     for name, decimals in columns.items():
         value, low, high = (values.get(f"{name}{part}", np.nan) for part in ("", "_low", "_high"))
+        if name.startswith("score_") and not decimals:
+            cells.append(score_text(value, low, high))
+            continue
         interval = "" if np.isnan(low) else f" [{low:.{decimals}f}, {high:.{decimals}f}]"
         cells.append("" if np.isnan(value) else f"{value:.{decimals}f}{interval}")
     return cells
@@ -140,7 +154,10 @@ def titled(script: str, shown_flags: str) -> str:
 
 
 def rows_of(results: Results, script: str, environment: str | None = None) -> list[tuple]:
-    """`line`'s arguments, the title being the flags, for a script's rows that have runs, the default first."""
+    """`line`'s arguments, the title being the flags, for a script's rows that have runs, the default first.
+
+    What was trained on another thaw reward is judged by the asymmetric one, as all others are.
+    """
     published = main_results.paper_rows().paper_scalarized
     found = [
         (key, replicates)
@@ -153,7 +170,8 @@ def rows_of(results: Results, script: str, environment: str | None = None) -> li
         title = ", ".join(filter(None, parts)) or "default"
         is_papers = title == "default" and env_id == GENERALIST
         papers = published.get(methods.paper_name(script), np.nan) if is_papers else np.nan
-        shown_rows.append((title, replicates, papers, script in methods.TRAINED))
+        judged = [under_asymmetric(results, one) or one for one in replicates]
+        shown_rows.append((title, judged, papers, script in methods.TRAINED))
     return sorted(shown_rows, key=lambda row: row[0] != "default")
 
 
@@ -223,7 +241,7 @@ def difficulty(results: Results) -> str:
 
 
 def choices_of(script: str, *experiments_: str):
-    """A script with one choice changed less its default, bold where the interval of five seeds and more lacks 0."""
+    """A script with one choice changed less its default, bold where both intervals of five seeds and more lack 0."""
 
     def written(results: Results) -> str:
         table = choices.make(results, script)
@@ -235,8 +253,7 @@ def choices_of(script: str, *experiments_: str):
         for row in table.to_dict("records"):
             cells = cells_of(row, decimals)
             for k, name in enumerate(decimals):
-                told = row[f"{name}_low"] > 0.0 or row[f"{name}_high"] < 0.0
-                cells[k] = f"**{cells[k]}**" if told and row["seeds"] >= FEWEST_SEEDS else cells[k]
+                cells[k] = f"**{cells[k]}**" if row[f"{name}_told"] and row["seeds"] >= FEWEST_SEEDS else cells[k]
             rows.append([flags(row["setting"]), f"`{row['environment']}`", str(row["seeds"]), *cells])
         header = [choices.COLUMNS[name] for name in ("setting", "environment", "seeds", *decimals)]
         return excerpts.markdown(header, rows)

@@ -1,7 +1,8 @@
 """What README.md and docs/results.md say first: rows of the main table, and what all its rows say, in words.
 
-Methods are compared with each other and with plans that look at nothing by the interval of their difference on the same
-sites, over training seeds and sites.
+Methods are compared with each other and with one plan that looks at nothing by the interval of their difference on the
+same sites, over training seeds and sites; with 100, the best plans of these sites, by the interval of the score, in
+which every drawn set of sites has its own best plans.
 """
 
 import textwrap
@@ -15,6 +16,7 @@ from analysis.experiments import BALANCED, GENERALIST, WEIGHTS
 from analysis.paper_claims.claim import FEWEST_SEEDS
 from analysis.results import PAIR
 from analysis.tables import main_results
+from analysis.tables.common import score_text
 
 WORLDS = (BALANCED, GENERALIST)
 BEST_PLAN, DECIDUOUS = "best_constant_mix", "dense_deciduous"
@@ -44,10 +46,7 @@ def blind(results, env_id: str, name: str) -> list:
 
 def shown(scores: dict) -> str:
     """The greedy score with its interval; empty where it is not known."""
-    value, low, high = (scores.get(f"score_greedy{part}", np.nan) for part in ("", "_low", "_high"))
-    if np.isnan(value):
-        return ""
-    return f"{value:.0f}" + ("" if np.isnan(low) or low == high else f" [{low:.0f}, {high:.0f}]")
+    return score_text(*(scores.get(f"score_greedy{part}", np.nan) for part in ("", "_low", "_high")))
 
 
 def short_table(results) -> str:
@@ -100,6 +99,11 @@ def is_above(replicates: list, other: list) -> bool:
 def is_below(replicates: list, other: list) -> bool:
     """Whether all of it lies below 0."""
     return len(replicates) > 1 and metrics.difference_interval(on_sites(replicates), on_sites(other))[2] < 0.0
+
+
+def beside_100(scores: dict) -> int:
+    """1 of a greedy score whose interval lies above 100, -1 of one below, 0 of one that has 100 in it."""
+    return int(scores["score_greedy_low"] > 100.0) - int(scores["score_greedy_high"] < 100.0)
 
 
 def points(replicates: list, other: list, best_plans: list) -> str:
@@ -168,12 +172,8 @@ def paragraph(results, env_id: str) -> str:
         return [method for method in trained if is_above(rows[method], other)]
 
     below = [method for method in trained if is_below(rows[method], rows[PLANTING])]
-    even = [
-        method
-        for method in trained
-        if len(rows[method]) > 1 and not is_above(rows[method], best_plans) and not is_below(rows[method], best_plans)
-    ]
-    under = [method for method in trained if is_below(rows[method], best_plans)]
+    beside = {method: beside_100(scores[method]) for method in trained if len(rows[method]) > 1}
+    over, even, under = ([method for method, side in beside.items() if side == which] for which in (1, 0, -1))
     below_it = "all are below it" if len(under) == len(trained) else f"{len(under)} below it"
     plans = (
         f"Plans that look at nothing: 100 stems a year, half of them conifers, score {known[PLANTING]:.0f}, 100 "
@@ -189,7 +189,7 @@ def paragraph(results, env_id: str) -> str:
     ahead += f", not told apart from {listed(titles_of(alike))}." if alike else "."
     ahead += (
         f" Its score less that of 100 deciduous trees a year is {points(rows[best], deciduous, best_plans)}. "
-        f"Compared on the same sites {named(above(best_plans))} above 100"
+        f"By their intervals {named(over)} above 100"
         + (f", {named(even)} not told apart from it" if even else "")
         + (f", {below_it}" if under else "")
         + f"; {named(above(rows[PLANTING]))} above planting half and half; "
@@ -197,10 +197,10 @@ def paragraph(results, env_id: str) -> str:
     )
     longer = with_more_steps(results, env_id)
     if len(longer) > 1:
-        ahead += (
-            f" With {MORE_STEPS:,} steps and {of_seeds(longer)} {methods.title(LEARNED[-1])} scores "
-            f"{shown(main_results.scores(longer))}; its score less 100 is {points(longer, best_plans, best_plans)}."
-        )
+        its = main_results.scores(longer)
+        side = {1: "above 100", 0: "not told apart from 100", -1: "below 100"}[beside_100(its)]
+        budget = f"With {MORE_STEPS:,} steps and {of_seeds(longer)}"
+        ahead += f" {budget} {methods.title(LEARNED[-1])} scores {shown(its)}, {side}."
     few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]
     if few:
         ahead += f" Few training seeds: {listed([f'{methods.title(*method)} {len(rows[method])}' for method in few])}."

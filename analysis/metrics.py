@@ -234,7 +234,7 @@ def score_interval(gained: np.ndarray, plans: np.ndarray | None, repetitions: in
     return middle, float(low), float(high)
 
 
-def difference_interval(first, second, repetitions: int = 4000) -> tuple[float, float, float]:
+def difference_interval(first, second, repetitions: int = 20_000) -> tuple[float, float, float]:
     """IQM over training seeds of one method's gain less another's, and its 95 % bootstrap interval.
 
     first, second : (seeds, sites), of `of_sites`. Sites are drawn anew for both at once, seeds for each by itself. One

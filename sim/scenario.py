@@ -24,7 +24,7 @@ WITHOUT_SCENARIO = {"warming_k": 0.0, "warming_amplitude_k": 0.0, "precipitation
 COLUMNS = {
     "warming_k": (-10.0, 15.0, "K"),
     "warming_amplitude_k": (-10.0, 10.0, "K"),
-    "precipitation_factor": (0.0, 3.0, "(1: as without)"),
+    "precipitation_factor": (0.3, 3.0, "(1: as without)"),
     CO2: (CONSTANTS[CO2].physical_low, CONSTANTS[CO2].physical_high, "ppm"),
 }
 

@@ -60,7 +60,7 @@ def simulate(
     constants=None,
     mechanisms=None,
     weather="paper",
-    boundary="sampled",
+    boundary=None,
     soil_carbon="drawn",
     scenario=None,
     hwp_half_life_years=None,
@@ -96,7 +96,7 @@ def simulate(
         "xarray" for a Dataset of both with names and units of ALMA and CF (`sim.io.dataset`; `.to_netcdf(file)`). A
         part of a year has no annual values.
     boundary : temperature far below: "sampled", the site's; "balanced", that at which no heat flows through it below
-        the first stand; or a number [degC].
+        the first stand; or a number [degC]. None: "balanced" with a forcing, unless the site has one, else "sampled".
     scenario : climate change, see `sim.Stands`; not with `forcing`, which is weather of its own.
     time_step_minutes : a divisor of a day of at most 120 minutes; by default 30, or the forcing's interval if longer.
     constants, mechanisms, weather, soil_carbon, hwp_half_life_years, harvest_min_class, backend : see `sim.Stands`.
@@ -135,7 +135,10 @@ def simulate(
     given = as_array(NO_CHANGE if actions is None else actions)
     per_year = np.full(years, given) if given.ndim == 0 else given
     check_actions(per_year, years, "years")
-    overrides, boundary = _with_boundary(check_mapping("site parameters", site), boundary)
+    given_site = check_mapping("site parameters", site)
+    if boundary is None:  # that of the middle site lies below no record's climate
+        boundary = "balanced" if forcing is not None and BOUNDARY not in given_site else "sampled"
+    overrides, boundary = _with_boundary(given_site, boundary)
     for name, value in overrides.items():
         if np.ndim(value):
             raise ValueError(f"site: {name} = {value!r}: one number is allowed for one stand")
@@ -190,7 +193,13 @@ def simulate(
         return daily
     boundary_c = stand.parameters[0, PARAMETER_NAMES.index(BOUNDARY)] - FREEZING_POINT_K
     about = {"seed": seed, "time_step_minutes": time_step_minutes, "hold_stand": int(hold_stand), "site": place}
-    about |= {"initial": stocks, "actions": per_year.tolist()}
+    place[BOUNDARY] = boundary_c + FREEZING_POINT_K
+    about |= {"initial": stocks, "actions": per_year.tolist(), "boundary": boundary}
+    about |= {"constants": {name: float(value) for name, value in (constants or {}).items()}}
+    about |= {"mechanisms": {name: bool(value) for name, value in (mechanisms or {}).items()}}
+    about |= {"weather": weather, "soil_carbon": soil_carbon}
+    if scenario is not None:
+        about["scenario"] = scenario if isinstance(scenario, str) else "a table"
     if forcing is not None:
         about["forcing"] = "; ".join(forcing.attrs.get("report", ["as given"]))
     if days < DAYS:

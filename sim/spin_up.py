@@ -14,7 +14,7 @@ from sim import organic, soil, structure
 from sim.deadwood import MOST_DEADWOOD
 from sim.demography import AGE_CLASSES, AGES, OLDEST, first_ages, stem_weight
 from sim.jit import uncompiled
-from sim.parameters import SITE_PARAMETERS, check_mapping
+from sim.parameters import CONSTANTS, SITE_PARAMETERS, check_mapping
 from sim.physical_constants import FREEZING_POINT_K, SQUARE_METRES_PER_HECTARE, WATER_DENSITY
 from sim.state import DAYS, STATE
 
@@ -23,6 +23,7 @@ node_capacities = uncompiled(soil.node_capacities)
 layer_capacities = uncompiled(organic.layer_capacities)
 crown_factor, weight = uncompiled(structure.crown_factor), uncompiled(stem_weight)
 
+DEFAULTS = {name: parameter.low for name, parameter in CONSTANTS.items()}
 SPIN_UP_YEARS = 8
 SPIN_UP_STEPS_PER_DAY = 12
 LONGEST_LEAP = 15.0  # years
@@ -69,6 +70,7 @@ INITIAL_LIMITS = {
 }
 
 LARGEST_STEM_KGC = 120.0  # of the last age, 26 cm thick (Lambert et al. 2005); a stand of sparse old trees has these
+LARGEST_OF_ITS_AGE = 3.0  # a choice: a given stem may have so many times the carbon that ours has at its age
 YEARLY_SURVIVAL = 0.975
 COHORT_YEARS = 20  # in which the stems of a first stand came up, as after a fire (Gutsell and Johnson 2002)
 
@@ -91,16 +93,42 @@ def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float
     for name in values:
         if name in CLASS_NAMES and set(values) & {"density_stems_ha", "conifer_fraction", "oldest_age_years"}:
             raise ValueError(f"initial {name}: stems by class exclude density, conifer fraction and oldest age")
-    classes = [values[name] for name in CLASS_NAMES if name in values]
-    stems, biomass = sum(classes) if classes else values.get("density_stems_ha"), values.get("biomass_kgc_m2", 0.0)
-    if stems == 0.0 and biomass > 0.0:
-        raise ValueError(f"initial biomass_kgc_m2 = {biomass:g}: without stems, 0 is allowed")
-    if stems is not None and biomass > (most := stems * LARGEST_STEM_KGC * 1e-4):
-        raise ValueError(
-            f"initial biomass_kgc_m2 = {biomass:g}: of {stems:g} stems/ha at most {most:.4g} is allowed, "
-            f"{LARGEST_STEM_KGC:g} kgC a stem"
-        )
+    biomass, held = values.get("biomass_kgc_m2", 0.0), most_biomass(values)
+    if held is not None:
+        stems, most = held
+        if stems == 0.0 and biomass > 0.0:
+            raise ValueError(f"initial biomass_kgc_m2 = {biomass:g}: without stems, 0 is allowed")
+        if biomass > most:
+            raise ValueError(
+                f"initial biomass_kgc_m2 = {biomass:g}: of {stems:g} stems/ha at most {most:.4g} is allowed, "
+                f"{most / stems * 1e4:.3g} kgC a stem of that age"
+            )
     return {name: float(value) for name, value in values.items()}
+
+
+def most_biomass(stocks) -> tuple | None:
+    """Stems [stems ha-1] and the most biomass that they hold [kgC m-2], from numbers or columns by record name.
+
+    None where neither density nor classes are given.
+    """
+    first, largest = first_ages(DEFAULTS), largest_stems()
+    by_class = [(stocks[name], k) for k, name in enumerate(CLASS_NAMES) if name in stocks]
+    if by_class:
+        ends = [largest[row, first[size + 1] - 1] for row, size in (divmod(k, len(AGE_CLASSES)) for _, k in by_class)]
+        stems = sum(number for number, _ in by_class)
+        return stems, sum(number * end for (number, _), end in zip(by_class, ends, strict=True)) * 1e-4
+    if "density_stems_ha" not in stocks:
+        return None
+    stems = stocks["density_stems_ha"]
+    if "oldest_age_years" not in stocks:
+        return stems, stems * LARGEST_STEM_KGC * 1e-4
+    return stems, stems * np.interp(stocks["oldest_age_years"], np.arange(AGES), largest.max(axis=0)) * 1e-4
+
+
+@functools.cache
+def largest_stems() -> np.ndarray:
+    """The most carbon that a given stem may have, by species and age [kgC], shape (2, AGES)."""
+    return read_only(np.minimum(LARGEST_OF_ITS_AGE * stem_sizes(DEFAULTS), LARGEST_STEM_KGC))
 
 
 def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:

@@ -154,7 +154,7 @@ RECORD = {
     "harvestable_stems_ha": ("stems ha-1", "stems that could be cut, before the action"),
     "biomass_change_kgc_m2": ("kgC m-2", "change of biomass"),
     "soil_change_kgc_m2": ("kgC m-2", "change of soil carbon"),
-    "hwp_stored_kgc_m2": ("kgC m-2", "carbon added to products"),
+    "hwp_stored_kgc_m2": ("kgC m-2", "carbon added to products: a share of all that is cut, whatever it is sold as"),
     "growth_heat_mj_m2": ("MJ m-2", "heat of wood that grew or went, at the trunks' temperature"),
     "energy_residual_w_m2": ("W m-2", "energy: largest failure of a step to close"),
     "canopy_residual_w_m2": ("W m-2", "largest imbalance left by Newton"),

@@ -265,6 +265,10 @@ def test_masks_of_another_number_of_objectives_are_refused():
 def test_an_action_that_a_mask_forbids_is_no_change():
     masks = np.zeros((3, 25), bool)
     masks[[0, 1], [24, 3]] = True
+    with pytest.raises(ValueError, match=r"action -1: integers in \[0, 25\) are allowed"):
+        boreal_env.where_valid(np.array([24, -1, 3]), masks)
+    with pytest.raises(ValueError, match=r"masks of shape \(25,\), bool: bool of shape \(n, 25\)"):
+        boreal_env.where_valid(np.array([24]), masks[0])
     assert boreal_env.where_valid(np.array([24, 24, 3]), masks).tolist() == [
         24,
         boreal_env.NO_CHANGE,

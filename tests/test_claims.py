@@ -420,6 +420,9 @@ def write_everything(folder, jobs):
         write_run(
             run, job.script, job.flags.get("seed", 1), *returns, weights=weights, **{"env_id": job.env_id} | flags
         )
+        if "thaw_formulation" in flags:
+            table = pd.read_csv(run / "evaluation.csv")
+            table.assign(asymmetric_thaw_return=table.thaw_return).to_csv(run / "evaluation.csv", index=False)
         if job.trains:
             training_episodes(flags.get("total_timesteps", 300_000), number).to_csv(run / "episodes.csv", index=False)
     studies = folder / "studies"

@@ -1,5 +1,7 @@
 """Output as an xarray Dataset: the tables' numbers in other units, CF's attributes, and NetCDF that comes back."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -32,7 +34,7 @@ def test_every_column_has_a_meaning_of_its_own(columns):
 def test_every_column_of_both_tables_is_there(dataset):
     assert {*VARIABLES, *PROFILE} == {*DAILY, "nee_kgc_m2"}
     assert {name for name in dataset if name.startswith("annual_")} == {
-        f"annual_{n.removeprefix('annual_')}" for n in (*RECORD, "nee_kgc_m2")
+        f"annual_{name}" for name in (*RECORD, "nee_kgc_m2")
     }
     names = [name for name, *_ in VARIABLES.values()]
     assert len(set(names)) == len(names) and set(names) <= set(dataset)
@@ -65,6 +67,9 @@ def test_the_soils_profile_is_at_the_depths_of_its_nodes(dataset, daily):
 def test_units_and_attributes_are_those_of_cf(dataset):
     assert dataset.attrs["Conventions"].startswith("CF-") and dataset.attrs["seed"] == 4
     assert '"latitude_deg"' in dataset.attrs["site"]
+    found = json.loads(dataset.attrs["site"])["deep_boundary_temperature_k"]
+    assert found == pytest.approx(float(dataset.SoilTemp[0, -1]))
+    assert {"constants", "mechanisms", "weather", "boundary", "soil_carbon"} <= set(dataset.attrs)
     for name, variable in dataset.data_vars.items():
         if name != "time_bnds":
             assert variable.attrs["units"] and variable.attrs["long_name"], name

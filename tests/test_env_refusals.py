@@ -1,6 +1,7 @@
 """What the environment refuses, and how it says so."""
 
 import gymnasium as gym
+import pandas as pd
 import pytest
 from playing import NAN, play, quick, quick_vector
 
@@ -36,6 +37,10 @@ BAD_ARGUMENTS = {
     "ranges without stems": (
         {"initial_ranges": {"density_stems_ha": (0, 0), "biomass_kgc_m2": (0, 10)}},
         r"biomass_kgc_m2: up to 10; .*\(0, 0\)",
+    ),
+    "objectives with numbers": (
+        {"objectives": {"carbon": 1, "thaw": 2}},
+        r"objectives: a list or tuple of carbon, thaw",
     ),
     "objectives without an order": ({"objectives": {"carbon", "thaw"}}, r"objectives: a list or tuple of carbon, thaw"),
     "ranges in a list": ({"initial_ranges": [1]}, r"initial.*dict.* got list"),
@@ -129,6 +134,10 @@ def test_step_after_the_end_is_refused():
         ({"preference": True}, r"preference: .* got True"),
         ({"preference": {0.5, 0.7}}, r"preference: a number in \[0, 1\] is allowed, got {0"),
         ({"preference": iter([0.5, 0.7])}, r"preference: .* got <list_iterator"),
+        (
+            {"preference": pd.Series({"thaw": 0.3, "carbon": 0.7})},
+            r"preference: a Series labelled \['thaw', 'carbon'\], which are not read",
+        ),
         ({"weight": 0.5}, r"unknown reset option 'weight'; allowed: preference, site"),
         ({"site": {"q11": 2.0}}, r"unknown site parameter 'q11'; did you mean q10"),
         ({"site": {"q10": 50.0}}, r"q10 = 50 is outside .*\[1, 4\]"),

@@ -8,6 +8,7 @@ import pytest
 
 from analysis import main_points
 from analysis.tables import main_results
+from analysis.tables.common import score_text
 
 WORLD = main_points.WORLDS[0]
 TRAINED = {"eupg_var_lambda": 60.0, "ppo_gated": 80.0, "ppo_group": 110.0, "moea": 65.0}
@@ -83,7 +84,7 @@ def test_more_steps_are_a_row_of_their_own(results):
         "\n| Group PPO, 1,000,000 steps | 5 | 110 [105, 115] | 110 [105, 115] |\n"
     )
     words = " ".join(main_points.in_words(results).split())
-    assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110 [105, 115]; its score less 100" in words
+    assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110 [105, 115], above 100." in words
 
 
 def test_the_words_follow_from_the_numbers(results):
@@ -95,8 +96,8 @@ def test_the_words_follow_from_the_numbers(results):
     )
     assert ahead == (
         "Of 5 trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds and a gain hypervolume "
-        "of 2.50. Its score less that of 100 deciduous trees a year is 15.0. Compared on the same sites "
-        "none is above 100, Group PPO is not told apart from it, 4 below it; Group PPO is above planting "
+        "of 2.50. Its score less that of 100 deciduous trees a year is 15.0. By their intervals "
+        "Group PPO is above 100, 3 below it; Group PPO is above planting "
         "half and half; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
     )
     assert followed == (
@@ -105,6 +106,11 @@ def test_the_words_follow_from_the_numbers(results):
         "whatever is asked for. (Greedy policies; said is what two intervals tell from 0, that over seeds and "
         "sites and that over seeds alone.)"
     )
+
+
+@pytest.mark.parametrize(("low", "high", "side"), [(100.1, 103, 1), (99.6, 103, 0), (95, 99.9, -1)])
+def test_which_side_of_100_an_interval_lies_on(low, high, side):
+    assert main_points.beside_100({"score_greedy_low": low, "score_greedy_high": high}) == side
 
 
 def test_methods_that_are_not_told_apart_from_the_best_are_named(results, monkeypatch):
@@ -148,6 +154,11 @@ def test_without_runs_nothing_is_said(results):
 def test_intervals_are_left_out_where_there_are_none():
     assert main_points.shown({"score_greedy": 99.6}) == "100"
     assert main_points.shown({"score_greedy": float("nan")}) == ""
+
+
+def test_an_end_that_is_not_100_is_not_shown_as_100():
+    assert score_text(101.2, 99.6, 101.9) == "101.2 [99.6, 101.9]"
+    assert score_text(100.0) == "100" and score_text(98.2, 96.0, 100.0) == "98 [96, 100]"
     assert main_points.named([], "store") == "none stores"
 
 

@@ -165,6 +165,11 @@ def test_other_formulations_are_judged_by_the_asymmetric_reward_too(tmp_path):
     # scalarised 2, 1, 2 of the weights 0, 0.5, 1; 5 (1 - w) less
     assert (row.scalarized, row.asymmetric_scalarized) == pytest.approx((5 / 3, 5 / 3 - 2.5))
     assert row.paper_scalarized_mean == 4.9
+    assert np.isnan(row.asymmetric_gain)  # without doing nothing on the same episodes
+    write_run(tmp_path / "runs" / "zero", "zero_change", carbon=(0, 0, 0), thaw=(-6, -6, -6))
+    make(tmp_path / "runs", tmp_path / "tables")
+    row = read(tmp_path / "tables", "thaw_formulations", "formulation").loc["contrast"]
+    assert row.asymmetric_gain == pytest.approx(row.asymmetric_scalarized + 3)  # thaw -6 at a mean weight of a half
 
 
 # ---------------------------------------------------------------------------------- rows and runs

@@ -84,6 +84,8 @@ def test_of_two_weights_the_first_is_one_uniform_number():
     u = np.random.default_rng(3).random()
     assert weights.tolist() == [u, 1.0 - u]
     assert boreal_env.draw_weights(np.random.default_rng(3), 1).tolist() == [1.0]
+    with pytest.raises(ValueError, match=r"generator: numpy.random.default_rng\(seed\) is allowed, got 3"):
+        boreal_env.draw_weights(3, 2)
 
 
 def test_vector_environments_take_weights_for_all_or_for_each():

@@ -1,6 +1,8 @@
 """Records of towers and reanalyses as forcing: each format gives the weather it was made of, what is filled is flagged,
 and what cannot be right is refused in a line that names the row and the column."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -303,6 +305,21 @@ def test_the_report_has_the_shift_and_what_it_leaves_and_all_is_100_percent():
     )
 
 
+def test_the_report_has_what_wrong_units_would_show():
+    report = sim.read_forcing(records.icos(), **SWEDEN).attrs["report"]
+    numbers = next(line for line in report if line.startswith("in numbers"))
+    assert re.search(r"wind 2.9\d? m s-1.*precipitation 591 mm a year, [34]\d % of it below 0 degC", numbers), numbers
+    assert any(re.search(r"the middle of the light is [+-]\d+ from solar noon", line) for line in report)
+
+
+@pytest.mark.parametrize("unit", ["°C", "deg C", "celsius"])
+def test_units_are_known_by_their_usual_spellings(unit):
+    table = records.icos(60).rename(columns={"TA": "air"})
+    named = {"columns": {"air_temperature": "air"}, **SWEDEN}
+    found = sim.read_forcing(table, units={"air": unit}, **named)
+    pd.testing.assert_frame_equal(found, sim.read_forcing(table, units={"air": "degC"}, **named))
+
+
 def test_years_are_chosen_and_29_february_is_dropped():
     forcing = sim.read_forcing(records.POKER_FLAT, years=(2012, 2013), **ALASKA)
     assert len(forcing) == 2 * 365 * 48 and "29 February was dropped in 1 year" in forcing.attrs["report"]
@@ -556,6 +573,11 @@ BAD = {
         with_times(lambda t: t // 100, [3000]),
         r"row 3000: TIMESTAMP_START is 2019030411; a time as",
     ),
+    "times of a spreadsheet": (
+        with_times(lambda t: ["43800.52083"], [3000]),
+        r"'43800.52083'; .*a count: read it by pandas, .* by pd.to_datetime\(.., unit='D', origin='1899-12-30'\)",
+    ),
+    "a time in dashes, of days first": (with_times(lambda t: ["31-12-19 12:00"], [3000]), r"of days or months first"),
     "a time of days first": (
         with_times(lambda t: ["31.12.2019 12:00"], [3000]),
         r"row 3000: TIMESTAMP_START is '31.12.2019 12:00'; .*of days or months first: read it by pandas",
@@ -630,7 +652,7 @@ BAD_ARGUMENTS = {
     ),
     "columns of another type": ({"columns": ["TA_F"]}, r"columns: a dict of names is allowed, got list"),
     "unit of no column": ({"units": {"TA": "K"}}, r"units: the record has no column 'TA'"),
-    "unknown unit": ({"units": {"TA_F": "F"}}, r"units: TA_F in 'F'; allowed for air_temperature: degC, K"),
+    "unknown unit": ({"units": {"TA_F": "R"}}, r"units: TA_F in 'R'; allowed for air_temperature: degC, K"),
     "unit of what is not used": ({"units": {"WD": "deg"}}, r"units: WD is not used; used are LW_IN_F"),
     "column without a unit": (
         {"columns": {"wind_speed": "WD"}},
@@ -777,7 +799,22 @@ UNUSUAL = {
     ),
     "saturated for a season": (lambda: still("RH", 100.0, 0, 31), r"RH is 1 from 2019-01-01 .* for 31 .* at most 30;"),
     "a dark June": (lambda: still("SW_IN", 0.0, 8000, 20), r"SW_IN is 0 W m-2 from 2019-06-16 .* for 20 days"),
+    "a gauge without snow": (
+        lambda: records.icos().assign(P=lambda t: t.P.where(t.TA > 0.0, 0.0)),
+        r"2019: P has 0 mm on the \d+ days below -5 degC, where 0.05 mm a day are the least that is usual: rain with",
+    ),
+    "three dark days": (
+        lambda: still("SW_IN", 0.0, 8000, 3),
+        r"SW_IN is 0 W m-2 from 2019-06-16 .* for 3.* days .* at most 1;",
+    ),
+    "no humidity": (lambda: still("RH", 0.0, 8000, 2), r"RH is 0 from 2019-06-16 .* for 2 days .* at most 1;"),
     "no rain": (lambda: still("P", 0.0, 3000, 130), r"P is 0 mm from 2019-03-04 .* for 13\d days .* at most 120"),
+    "weather of a fortnight ago": (
+        lambda: records.icos().assign(
+            **{c: np.roll(records.icos()[c], 48 * 14) for c in ("TA", "RH", "SW_IN", "LW_IN")}
+        ),
+        r"2019: SW_IN has the hours of daylight of latitude 64, 15 days after their dates there, where latitude",
+    ),
     "the sun at midnight": (
         lambda: still("SW_IN", 1400.0, 8016, 1 / 48),
         r"SW_IN is 1400 W m-2 at 2019-06-17 00:00 solar time, where the sun above the atmosphere gives [\d.]+; 1 of ",
@@ -813,6 +850,23 @@ def test_what_no_weather_and_no_sensor_gives_is_refused_and_may_be_taken(make, m
 )
 def test_what_weather_and_sensors_give_is_read(make):
     assert sim.read_forcing(make(), **SWEDEN).attrs["unusual"] == []
+
+
+@pytest.mark.parametrize(
+    ("latitude", "message"),
+    [
+        (56.0, "hours of daylight of latitude 64, where latitude_deg is 56"),
+        (70.0, "where the sun above|sunlight above"),
+    ],
+)
+def test_half_hours_of_another_latitude_are_refused(latitude, message):
+    with pytest.raises(ValueError, match=message):
+        sim.read_forcing(records.icos(), **SWEDEN | {"latitude_deg": latitude})
+
+
+def test_days_of_another_latitude_are_refused():
+    with pytest.raises(ValueError, match="ssrd has the brightest days of latitude 6[3-6].*, where latitude_deg is 50"):
+        sim.read_forcing(records.era5_daily(), latitude_deg=50.0)
 
 
 def test_only_the_years_that_are_wanted_have_to_be_right():
@@ -877,6 +931,15 @@ def test_rain_by_the_day_is_refused_of_a_forcing_of_ones_own(weather):
         ValueError, match=r"precipitation_mm is 3.5e\+04 mm a year in 2019; .* 5000\] is allowed .*30 minutes"
     ):
         check_forcing(weather.assign(precipitation_mm=2.0), 30, 1)
+
+
+def test_a_year_that_is_missing_between_others_is_a_gap():
+    table = records.era5_daily()
+    table = pd.concat([table, table.assign(valid_time=table.valid_time + pd.Timedelta(days=731))])
+    # 29 February is no part of it
+    for gaps, message in (("refuse", "no row for 2020-01-01 after"), ("fill", "from 2020-01-01 00:00 on for 365 days")):
+        with pytest.raises(ValueError, match=message):
+            sim.read_forcing(table, latitude_deg=SWEDEN["latitude_deg"], gaps=gaps)
 
 
 def test_a_gap_that_is_too_long_is_refused():

@@ -216,7 +216,7 @@ BAD = {
     "gap": ({"warming_k": [1.0, 1.0, NAN, 1.0]}, r"scenario warming_k = nan in 2027: \[-10, 15\] K is allowed"),
     "absurd": ({"warming_k": [1.0, 150.0, 1.0, 1.0]}, r"scenario warming_k = 150 in 2026: \[-10, 15\] K"),
     "negative co2": ({"co2_ppm": [-400.0] * 4}, r"scenario co2_ppm = -400 in 2025: \[200, 1500\] ppm"),
-    "negative rain": ({"precipitation_factor": [-0.1] * 4}, r"precipitation_factor = -0.1 in 2025: \[0, 3\]"),
+    "negative rain": ({"precipitation_factor": [-0.1] * 4}, r"precipitation_factor = -0.1 in 2025: \[0.3, 3\]"),
     "years apart": (
         {"warming_k": {2025: 1, 2027: 1, 2028: 1, 2029: 1}},
         r"have to follow each other, got 2027 after 2025",

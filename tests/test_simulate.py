@@ -655,6 +655,13 @@ def test_leaf_area_is_the_one_that_is_given(initial):
     pd.testing.assert_frame_equal(simulate(initial=initial, seed=3, lai=as_it_is.max_lai[0]), as_it_is, rtol=1e-6)
 
 
+def test_below_observed_weather_the_boundary_is_in_balance_unless_the_site_has_one():
+    warm = observed(air_temperature_c=5.0)
+    pd.testing.assert_frame_equal(simulate(forcing=warm), simulate(forcing=warm, boundary="balanced"))
+    cold = {"deep_boundary_temperature_k": 270.0}
+    pd.testing.assert_frame_equal(simulate(cold, forcing=warm), simulate(cold, forcing=warm, boundary="sampled"))
+
+
 def test_a_boundary_in_degrees_is_the_sites():
     by_number = simulate(boundary=-2.0)
     pd.testing.assert_frame_equal(by_number, simulate({"deep_boundary_temperature_k": 273.15 - 2.0}))
@@ -730,6 +737,14 @@ BAD = {
     "more carbon than stems hold": (
         {"initial": {"density_stems_ha": 10.0, "biomass_kgc_m2": 6.0}},
         r"initial biomass_kgc_m2 = 6: of 10 stems/ha at most 0.12 is allowed, 120 kgC a stem",
+    ),
+    "seedlings as heavy as trees": (
+        {"initial": {"conifer_seedling_stems_ha": 1000.0, "biomass_kgc_m2": 10.0}},
+        r"biomass_kgc_m2 = 10: of 1000 stems/ha at most 0.0\d+ is allowed, 0.481 kgC a stem of that age",
+    ),
+    "trees of five years as heavy as old ones": (
+        {"initial": {"density_stems_ha": 900.0, "oldest_age_years": 5, "biomass_kgc_m2": 10.0}},
+        r"of 900 stems/ha at most 0.2\d+ is allowed, 3.28 kgC a stem of that age",
     ),
     "unknown stock": ({"initial": {"carbon": 1}}, r"unknown initial stock 'carbon'; allowed: density_stems_ha"),
     "negative stock": ({"initial": {"soil_kgc_m2": -1}}, r"initial soil_kgc_m2 = -1: a number in \[0, 100\]"),

@@ -54,7 +54,7 @@ SENTENCES = (
     ),
     Sentence(
         preference.curriculum_follows,
-        "thaw return, weight 1 less weight 0",
+        "carbon return, weight 1 less weight 0",
         "Curriculum PPO follows the preference in both returns",
         "Curriculum PPO does not follow the preference in both returns",
         "Whether Curriculum PPO follows the preference in both returns is open",

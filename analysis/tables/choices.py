@@ -1,7 +1,8 @@
 """What each choice of a script is worth: its runs with one thing changed less those without, paired by training seed.
 
 How far the preference is followed is the change of a return from weight 0 to 1. Differences are over the same sites,
-and their 95 % intervals over seeds and sites together.
+and their 95 % intervals over seeds and sites together; `_told` says that 0 is neither in them nor in the t interval of
+the seeds.
 """
 
 import numpy as np
@@ -34,14 +35,25 @@ def by_seed(replicates: list) -> dict[int, object]:
     return {one.runs[0].arguments["seed"]: one for one in known}
 
 
-def score_difference(pairs: list[tuple], policy: str) -> tuple[float, float, float]:
-    """Score of the first of each pair less that of the second, with its interval over seeds and sites."""
+def is_told(changes: np.ndarray, low: float, high: float) -> bool:
+    """Whether neither an interval nor, of the differences (seeds, sites), the t interval over seeds has 0 in it."""
+    mean, half_width = metrics.mean_interval(np.asarray(changes).mean(axis=1))
+    return bool(min(low, mean - half_width) > 0.0 or max(high, mean + half_width) < 0.0)
+
+
+def difference(name: str, changes: np.ndarray, plans: np.ndarray | None) -> dict:
+    """Differences (seeds, sites): value with its interval, as a score where there are plans, and whether it is told."""
+    value, low, high = metrics.score_interval(changes, plans)
+    return named(name, value, low, high) | {f"{name}_told": is_told(changes, low, high)}
+
+
+def score_difference(name: str, pairs: list[tuple], policy: str) -> dict:
+    """Score of the first of each pair less that of the second."""
     sites = [
         metrics.of_sites(one.by_policy[policy]) - metrics.of_sites(other.by_policy[policy]) for one, other in pairs
     ]
-    plans = pairs[0][0].plans
     weights = np.unique(metrics.weights_of(pairs[0][0].gains), axis=0)
-    return metrics.score_interval(pd.DataFrame(sites), metrics.plans_of_sites(plans, weights))
+    return difference(name, pd.DataFrame(sites).to_numpy(), metrics.plans_of_sites(pairs[0][0].plans, weights))
 
 
 def make(results, only: str | None = None) -> pd.DataFrame:
@@ -56,12 +68,12 @@ def make(results, only: str | None = None) -> pd.DataFrame:
         row = row_of(key, len(pairs))
         if pairs:
             for policy in protocol.POLICIES:
-                row |= named(f"score_{policy}", *score_difference(pairs, policy))
+                row |= score_difference(f"score_{policy}", pairs, policy)
             sites = [
                 metrics.response_of_sites(one.evaluation) - metrics.response_of_sites(other.evaluation)
                 for one, other in pairs
             ]
             for name, change in zip(CHANGES, np.stack(sites, axis=1), strict=True):
-                row |= named(name, *metrics.score_interval(change, None))
+                row |= difference(name, change, None)
         rows.append(row)
     return pd.DataFrame(rows)

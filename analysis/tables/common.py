@@ -49,6 +49,15 @@ def cell(row: pd.Series, name: str) -> str:
     return f"{value:.4g}" if pd.isna(low) else f"{value:.4g} [{low:.4g}, {high:.4g}]"
 
 
+def score_text(value: float, low: float = np.nan, high: float = np.nan) -> str:
+    """A score with its interval; of one decimal where an end that is not 100 would be printed as 100."""
+    digits = 1 if any(round(end) == 100 != end for end in (low, high) if not np.isnan(end)) else 0
+    if np.isnan(value):
+        return ""
+    one = np.isnan(low) or low == high
+    return f"{value:.{digits}f}" + ("" if one else f" [{low:.{digits}f}, {high:.{digits}f}]")
+
+
 def readable(table: pd.DataFrame, columns: dict[str, str]) -> pd.DataFrame:
     """The table's chosen columns as text: name -> heading. A row without runs says so in the cell after `seeds`.
 

@@ -1,10 +1,14 @@
-"""Gated PPO trained on each formulation of the thaw reward, under its own reward and under the asymmetric one."""
+"""Gated PPO trained on each formulation of the thaw reward, under its own reward and under the asymmetric one.
+
+A formulation changes the unit of the thaw return, so that gains compare under one reward alone, the asymmetric one.
+"""
 
 import pandas as pd
 
 from analysis import metrics
 from analysis.tables.common import over_seeds, paper
 from analysis.tables.main_results import front_metrics
+from cleanrl_style import protocol
 
 MADE_BY = "python analysis/reproduce.py --only main thaw"
 FORMULATIONS = {"asymmetric": "main", "contrast": "thaw", "raw_degree_days": "thaw"}  # -> experiment
@@ -25,9 +29,9 @@ COLUMNS = {
     "paper_hypervolume": "hypervolume (paper)",
     "sparsity": "sparsity",
     "paper_sparsity": "sparsity (paper)",
-    "gain_scalarized": "gain",
     "asymmetric_scalarized": "scalarised, asymmetric reward",
     "asymmetric_thaw": "thaw, asymmetric reward",
+    "asymmetric_gain": "gain, asymmetric reward",
 }
 # Column of the evaluation of a run trained on another formulation: its thaw return under the asymmetric reward.
 ASYMMETRIC = "asymmetric_thaw_return"
@@ -46,27 +50,44 @@ def replicates_of(results, formulation: str) -> list:
     return results.of(FORMULATIONS[formulation], "ppo_gated", **flags)
 
 
+def under_asymmetric(results, one):
+    """A replicate whose episodes are judged by the asymmetric reward; None if its evaluation lacks that."""
+    arguments = one.runs[0].arguments
+    if arguments["thaw_formulation"] == "asymmetric":
+        return one
+    by_policy = {}
+    for policy in protocol.POLICIES:
+        table = pd.concat([run.of_policy(policy) for run in one.runs], ignore_index=True)
+        if ASYMMETRIC not in table:
+            return None
+        table = table.assign(thaw_return=table[ASYMMETRIC]).drop(columns=ASYMMETRIC)
+        scalarized = metrics.scalarize(metrics.returns_of(table), metrics.weights_of(table))
+        by_policy[policy] = table.assign(scalarized_return=scalarized)
+    return results.replicate(one.runs, by_policy, one.runs[0].primary, arguments["env_id"])
+
+
 def run_numbers(one) -> dict:
-    """Numbers of one run; those under the asymmetric reward if the evaluation has it."""
+    """Numbers of one run under its own reward."""
     evaluation = one.evaluation
-    row = front_metrics(evaluation) | {
+    return front_metrics(evaluation) | {
         "carbon": evaluation.carbon_return.mean(),
         "carbon_sd": evaluation.carbon_return.std(),
         "thaw": evaluation.thaw_return.mean(),
         "thaw_sd": evaluation.thaw_return.std(),
         "scalarized_sd": evaluation.scalarized_return.std(),
     }
-    if one.gains is not None:
-        row["gain_scalarized"] = metrics.mean_scalarized(one.gains)
-    if one.runs[0].arguments["thaw_formulation"] == "asymmetric":
-        judged = evaluation
-    elif ASYMMETRIC in evaluation:
-        judged = evaluation.assign(thaw_return=evaluation[ASYMMETRIC])
-    else:
-        return row
-    row["asymmetric_scalarized"] = metrics.mean_scalarized(judged)
-    row["asymmetric_thaw"] = judged.thaw_return.mean()
-    return row
+
+
+def asymmetric_numbers(results, one) -> dict:
+    """Its numbers under the asymmetric reward, if they are known."""
+    judged = under_asymmetric(results, one)
+    if judged is None:
+        return {}
+    row = {
+        "asymmetric_scalarized": metrics.mean_scalarized(judged.evaluation),
+        "asymmetric_thaw": judged.evaluation.thaw_return.mean(),
+    }
+    return row if judged.gains is None else row | {"asymmetric_gain": metrics.mean_scalarized(judged.gains)}
 
 
 def make(results) -> pd.DataFrame:
@@ -75,7 +96,8 @@ def make(results) -> pd.DataFrame:
     numbers = [name for name in COLUMNS if name not in ("formulation", "seeds") and not name.startswith("paper_")]
     rows = []
     for formulation in FORMULATIONS:
-        table = pd.DataFrame([run_numbers(one) for one in replicates_of(results, formulation)], columns=numbers)
+        found = [run_numbers(one) | asymmetric_numbers(results, one) for one in replicates_of(results, formulation)]
+        table = pd.DataFrame(found, columns=numbers)
         row = {"formulation": formulation, "seeds": len(table)} | over_seeds(table.drop(columns=SPREADS))
         rows.append(row | table[SPREADS].mean().to_dict() | published.loc[formulation].to_dict())
     return pd.DataFrame(rows)

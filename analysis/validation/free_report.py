@@ -62,6 +62,7 @@ def deaths(run: Run) -> np.ndarray:
     return 100.0 * np.divide(dead, whole, out=np.zeros_like(dead), where=whole > 0.0)
 
 
+COLDER = "a colder climate than that of the measured stands"
 THINNED = "stems of an age are alike: the suppressed among them do not die first"
 QUANTITIES = {
     "biomass": Quantity(
@@ -69,7 +70,7 @@ QUANTITIES = {
         lambda run: run.annual["biomass_kgc_m2"],
         1,
         f"light use; {THINNED}",
-        "light use; few trees die",
+        "few trees die; young trees lose little litter",
     ),
     "density": Quantity(
         "stems ha-1",
@@ -86,8 +87,15 @@ QUANTITIES = {
         "crowns close early",
     ),
     "basal area": Quantity("m2 ha-1", lambda run: run.annual["basal_area_m2_ha"], 0, "biomass", "biomass"),
-    "GPP": Quantity(FLUX, lambda run: run.annual["gpp_kgc_m2"], 2, "leaf area; light use", "light use", True),
-    "NPP": Quantity(FLUX, net_primary_production, 2, "leaf area; respiration", "respiration", True),
+    "GPP": Quantity(
+        FLUX,
+        lambda run: run.annual["gpp_kgc_m2"],
+        2,
+        COLDER,
+        "light use",
+        True,
+    ),
+    "NPP": Quantity(FLUX, net_primary_production, 2, COLDER, "respiration", True),
     "NEP": Quantity(FLUX, net_production, 2, "soil carbon drawn is beyond the litter's", "few dead trees", True),
     "deaths": Quantity("% yr-1", deaths, 1, "no old trees", THINNED, True),
 }

@@ -168,7 +168,7 @@ CHECKS = {
     "surface soil less air": Check(
         "K",
         surface_offset,
-        _for(ALL, 2.0, 5.0),
+        _for(ALL, 1.7, 5.0),
         "US-Prr 3.1 (2011-14), SE-Svb 1.7 (2019); Zhang et al. 2018; snow alone 5.1 ± 3.2 (Peng et al. 2024)",
         "dense, thin snow",
         "snow",

@@ -18,7 +18,7 @@ UNDISTURBED = {"fire": False, "insects": False}
 FLUXES = {"gpp": "GPP", "reco": "ecosystem respiration", "nee": "NEE, uptake negative", "et": "evapotranspiration"}
 UNITS = {"gpp": "gC m-2 day-1", "reco": "gC m-2 day-1", "nee": "gC m-2 day-1", "et": "mm day-1"}
 LIKELY = {
-    "gpp": "colder climate than any tower's; light use is that of ten Nordic forests, on better ground",
+    "gpp": "colder climate than any tower's; light use is that of forests on better ground",
     "reco": "little soil carbon (2-10 kgC/m2) with one slow pool in a cold climate",
     "nee": "respiration too low; GPP perhaps too high, as these sites are colder than every tower",
     "et": "colder climate than any tower's; autumn rain is scarce",

@@ -202,7 +202,8 @@ class Run:
         if (self.folder / "evaluation.csv").exists():
             damaged = damage_of(self.folder, len(self.args.eval_weights))
             if damaged:
-                what = "damaged" if (self.folder / damaged).exists() else "missing"
+                unsaved = " (removed, or never written: run.save_policy does)" if damaged == "policy.pt" else ""
+                what = "damaged" if (self.folder / damaged).exists() else f"missing{unsaved}"
                 fail(f"{self.folder / damaged} is {what}; --overwrite starts over")
             print(f"{self.folder}: this run is finished (--overwrite starts over)")
             sys.exit(0)

@@ -13,7 +13,8 @@ DAY = 1440  # minutes
 MOST_MINUTES = 120
 _FORMATS = {8: "%Y%m%d", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
 _DAY_END = re.compile(r"(^\d{8}|[ T])24(:?00(?::?00)?)$")  # 24:00
-_DAY_FIRST = re.compile(r"\d{1,2}[./]\d{1,2}[./]\d{4}")
+_DAY_FIRST = re.compile(r"\d{1,2}[./-]\d{1,2}[./-]\d{2,4}\b")
+_SERIAL = re.compile(r"[1-9]\d{4}(\.\d+)?$|1\d{9}(\.\d+)?$")  # days of a spreadsheet, seconds since 1970
 _WITH_ZONE = re.compile(r"(:\d\d(?:\.\d+)?)\s?(?:Z|[+-]\d\d(?::?\d\d)?)$")
 
 
@@ -50,6 +51,9 @@ def read_times(table: Table, texts: pd.Series, name: str, *, zone: bool = True) 
             hint = "; rows of units below the names have to be removed"
         elif _DAY_FIRST.match(str(value)):
             hint = "; of days or months first: read it by pandas, its times by pd.to_datetime(.., format=..)"
+        elif _SERIAL.match(str(value)):
+            of = "unit='s')" if re.match(r"\d{10}", str(value)) else "unit='D', origin='1899-12-30')"
+            hint = f"; a count: read it by pandas, its times by pd.to_datetime(.., {of}.dt.round('min')"
         raise ValueError(
             f"{table.where(row)}: {name} is {value!r}; a time as 201906031230 or 2019-06-03 12:30 is allowed{hint}"
         )

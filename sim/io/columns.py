@@ -203,7 +203,7 @@ def choose(
     column -> unit; empty : function of a column that says whether it has no number; told : column -> unit, as the
     record's own attributes say, which `units` overrule. Raises ValueError naming what is missing, unknown or not clear.
     """
-    columns, units = dict(columns or {}), dict(units or {})
+    columns, units = dict(columns or {}), {name: _spelled(unit) for name, unit in (units or {}).items()}
     for quantity, name in columns.items():
         if quantity not in (*NAMES, *TIMES):
             raise ValueError(f"columns: unknown quantity {quantity!r}; allowed: {', '.join((*NAMES, *TIMES))}")

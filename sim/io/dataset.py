@@ -88,7 +88,7 @@ def to_dataset(
     for column in annual.columns.drop("year"):
         unit, meaning = columns[column]
         attributes = {"long_name": f"{meaning}, of the year", "units": _UDUNITS.get(unit, unit)}
-        variables[f"annual_{column.removeprefix('annual_')}"] = ("year", annual[column].to_numpy(), attributes)
+        variables[f"annual_{column}"] = ("year", annual[column].to_numpy(), attributes)
 
     depth = [0.0, 0.5 * constants["surface_soil_depth_m"], constants["deep_soil_node_m"], constants["boundary_depth_m"]]
     below = {
@@ -107,7 +107,8 @@ def to_dataset(
         "title": "A boreal stand",
         "source": "BoreaRL simulator (sim.simulate)",
         "references": "https://arxiv.org/abs/2509.19846",
-        "comment": "Names as in ALMA. Heat and vapour upward positive, ground heat downward; NEE: uptake is negative.",
+        "comment": "Names as in ALMA. Heat and vapour upward positive, ground heat (Qg), that into the boundary (Qbot) "
+        "and net radiation (Rnet) downward; NEE: uptake is negative.",
         **{name: value if isinstance(value, (str, int, float)) else json.dumps(value) for name, value in about.items()},
     }
     dataset = xarray.Dataset(variables, coordinates, attributes)

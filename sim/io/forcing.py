@@ -21,7 +21,7 @@ from sim.io.clock import (
 from sim.io.columns import LIMITS, NAMES, Choice, Column, choose
 from sim.io.disaggregation import FOREST_CYCLE, DiurnalCycle, climate_of, half_hours, leap_day, saturation_water
 from sim.io.longwave import cloud_cover, longwave
-from sim.io.plausible import FEWEST_DAYS, check_sun, percent, unusual_lines
+from sim.io.plausible import FEWEST_DAYS, check_sun, in_numbers, percent, unusual_lines
 from sim.io.table import Table, open_table
 from sim.parameters import SITE_PARAMETERS
 from sim.state import FORCING
@@ -145,13 +145,14 @@ def read_forcing(
         if utc_offset_h is None:
             raise ValueError(_offset_needed(record, interval, longitude_deg))
         ahead = minutes_ahead(longitude_deg, utc_offset_h)
-        check_sun(table.name, record, interval, 12.0 - ahead / 60.0, f"utc_offset_h = {utc_offset_h:g}")
+        late = check_sun(table.name, record, interval, 12.0 - ahead / 60.0, f"utc_offset_h = {utc_offset_h:g}")
         shift = interval * round(ahead / interval)
         for each in (record, flags, row_of):
             each.index = each.index + pd.Timedelta(minutes=shift)
         report.append(
             f"times are moved by {shift:+d} minutes, whole intervals, to local solar time, which is {ahead:+.1f} from "
             f"the record's clock: {ahead - shift:+.1f} are left"
+            + ("" if late is None else f"; by its clock the middle of the light is {60.0 * late:+.0f} from solar noon")
         )
 
     wanted = _whole_days(table, record.index, interval, years)
@@ -165,6 +166,7 @@ def read_forcing(
     _repeat_at_edges(record, flags, row_of, interval)
     _fill(table, record, flags, row_of, choice, interval, gaps, longest_gap_days)
     _add_longwave(record, flags, choice, latitude_deg)
+    report.append(in_numbers(record, interval))
     site = {"latitude_deg": float(latitude_deg), **climate_of(record["air_temperature"])}
     flags = flags.fillna(GIVEN).astype("int8")
     if interval == DAY:
@@ -441,11 +443,11 @@ def _fill(table, record, flags, row_of, choice: Choice, interval: int, gaps: str
         if quantity == "longwave":
             _put(record, flags, quantity, filling.interpolated(record[quantity], interval), BY_LINE)
             continue
-        left = record[quantity].isna().to_numpy() & kept
-        first, length = filling.longest(left)
+        first, length = filling.longest(record[quantity].isna().to_numpy()[kept])
         if length > longest_gap_days * per_day:
+            begin = record.index[kept][first]
             raise ValueError(
-                f"{table.name}: {_name(choice, quantity)} is missing from {record.index[first]:%Y-%m-%d %H:%M} on for "
+                f"{table.name}: {_name(choice, quantity)} is missing from {begin:%Y-%m-%d %H:%M} on for "
                 f"{length / per_day:.3g} days; gaps of up to longest_gap_days = {longest_gap_days:g} are filled"
             )
         if quantity != "precipitation":

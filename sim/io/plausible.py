@@ -40,6 +40,9 @@ MOST_WIND_M_S = 7.0
 LEAST_WIND_M_S = 1.0  # of a unit that is proposed
 #: A choice: the driest of the boreal forest, in Yakutia and on the Yukon Flats, has around 200 mm; of that half.
 LEAST_MM_A_YEAR = 100.0
+#: Days so cold that what falls is snow, and the least of it [mm a day] that a gauge catches there: in Yakutsk, where
+#: winters are the driest of the boreal forest, 0.2 fall. A choice, a quarter of that.
+SNOW_C, FROSTY_DAYS, LEAST_SNOW_MM_A_DAY = -5.0, 30, 0.05
 #: More days than these of one and the same number no sensor gives that works. Ice held the anemometer of Poker Flat for
 #: 8; saturated air is longer the same (`SATURATED_DAYS`); the longest time without rain there was 50 days.
 SAME_DAYS = {
@@ -51,6 +54,7 @@ SAME_DAYS = {
     "precipitation": 120,
 }
 SATURATED, SATURATED_DAYS = 0.97, 30
+DEAD_DAYS = 1.0  # of light or relative humidity that is 0, where there is some
 FEWEST_SAME = 6  # rows: of days rounded to 0.1 K three in a row are the same by chance
 #: An interval's light may be more than the sky's above the atmosphere by this factor and sum, beside bright clouds and
 #: in twilight; and its clock may be off by what `check_sun` lets pass and by the equation of time.
@@ -58,16 +62,26 @@ BRIGHTER, BRIGHTER_W_M2, SUN_WITHIN_H = 1.1, 50.0, NOON_WITHIN_H + 0.3
 #: Robust deviations from the month around beyond which air is not of its season, and the least that is one: 8 times 5 K
 #: is more than a foehn brings to a quiet month.
 DEVIATIONS, LEAST_DEVIATION_K = 8.0, 5.0
+#: Light by which an interval is of the day, and the sun's height at which there is as much. By the length of their days
+#: Svartberget and Sodankylä are found to 1 degree and 3 days; by the brightest daily means Poker Flat, in each of 26
+#: years, to 1 degree and 6 days, Svartberget to 1 and 3, shaded Sodankylä to 6 and 4.
+DAYLIGHT_W_M2, SUNRISE_DEG, HALF_MONTH = 5.0, 1.0, 15
+PLACE_WITHIN, PLACE_WITHIN_OF_DAYS = (5.0, 10), (9.0, 14)  # degrees of latitude, days
+TILT = np.array([declination(day) for day in range(366)])
+A_YEAR = pd.date_range("2001-01-01", periods=DAYS)
 
 
-def check_sun(name: str, weather: pd.DataFrame, interval: int, expected_h: float, clock: str) -> None:
-    """Refuse sunlight whose middle is not at noon. expected_h : the hour of the index at which the sun is highest."""
+def check_sun(name: str, weather: pd.DataFrame, interval: int, expected_h: float, clock: str) -> float | None:
+    """Hours that the middle of the sunlight is after noon, where it can be told. Raises ValueError if they are many.
+
+    expected_h : the hour of the index at which the sun is highest.
+    """
     days = weather["shortwave"].groupby(weather.index.normalize()).mean()
     if (days > 20.0).sum() < FEWEST_DAYS:
-        return
+        return None
     noon = noon_of(weather.index, interval, weather["shortwave"].to_numpy())
     if noon is None:
-        return
+        return None
     late = hours_apart(noon, expected_h)
     if abs(late) > NOON_WITHIN_H:
         when = "after" if late > 0 else "before"
@@ -75,6 +89,19 @@ def check_sun(name: str, weather: pd.DataFrame, interval: int, expected_h: float
             f"{name}: the record has the middle of its light {abs(late):.1f} hours {when} solar noon; {clock}, "
             "longitude_deg, or starts that are ends of the intervals may be wrong"
         )
+    return late
+
+
+def in_numbers(weather: pd.DataFrame, interval: int) -> str:
+    """What a record amounts to, by which a wrong unit or a gauge without snow may be noticed."""
+    rain, frosty = weather["precipitation"], weather["air_temperature"] < 0.0
+    a_year = rain.mean() * DAY / interval * DAYS
+    snow = f", {percent(rain[frosty].sum() / rain.sum())} of it below 0 degC" if rain.sum() > 0.0 else ""
+    return (
+        f"in numbers: air {weather['air_temperature'].mean():.1f} degC, relative humidity "
+        f"{percent(weather['humidity'].mean())}, wind {weather['wind_speed'].mean():.1f} m s-1, shortwave "
+        f"{weather['shortwave'].mean():.0f} W m-2 in the mean; precipitation {a_year:.0f} mm a year{snow}"
+    )
 
 
 def percent(share: float) -> str:
@@ -123,7 +150,17 @@ def _as_a_whole(year, columns, latitude_deg, interval, relative) -> Iterator[str
 
             what = f"a clear day has {share}, where 60 to 85 are usual"
             yield _other_unit(columns["shortwave"], what, year, seconds, clear)
-    if len(days) >= DAYS_OF_A_YEAR:
+    if place := place_of_sun(year["shortwave"], interval):
+        latitude, late = place
+        degrees, most = PLACE_WITHIN if interval != DAY else PLACE_WITHIN_OF_DAYS
+        if abs(latitude - latitude_deg) > degrees or abs(late) > most:
+            what = "hours of daylight" if interval != DAY else "brightest days"
+            when = f", {abs(late)} days {'after' if late > 0 else 'before'} their dates there" if late else ""
+            yield (
+                f"{columns['shortwave'].name} has the {what} of latitude {latitude:.0f}{when}, where latitude_deg is "
+                f"{latitude_deg:g}: that, or the dates, may be wrong"
+            )
+    if days["air_temperature"].count() >= DAYS_OF_A_YEAR:
         warmest = warmest_day(days["air_temperature"])
         if not WARMEST_DAY[0] <= warmest <= WARMEST_DAY[1]:
             yield (
@@ -132,7 +169,7 @@ def _as_a_whole(year, columns, latitude_deg, interval, relative) -> Iterator[str
             )
 
     yield from _of_humidity(year, columns["humidity"], seconds, relative)
-    rain, few = year["precipitation"], len(days) < DAYS_OF_A_YEAR
+    rain, few = year["precipitation"], days["precipitation"].count() < DAYS_OF_A_YEAR
     negative = float((year["precipitation_measured"] < -1e-3).sum() / max(rain.count(), 1))
     if negative > MOST_LIMITED:
         yield (
@@ -147,6 +184,13 @@ def _as_a_whole(year, columns, latitude_deg, interval, relative) -> Iterator[str
     if not few and not least <= a_year(rain) <= most:
         what = f"precipitation is {a_year(rain):.3g} mm a year; [{least:g}, {most:g}] is usual"
         yield _other_unit(columns["precipitation"], what, year, seconds, lambda v: least <= a_year(v) <= most)
+
+    snow = rain.groupby(rain.index.normalize()).sum(min_count=1)[days["air_temperature"] < SNOW_C].dropna()
+    if len(snow) >= FROSTY_DAYS and snow.mean() < LEAST_SNOW_MM_A_DAY and a_year(rain) >= LEAST_MM_A_YEAR:
+        yield (
+            f"{columns['precipitation'].name} has {snow.sum():.2g} mm on the {len(snow)} days below {SNOW_C:g} degC, "
+            f"where {LEAST_SNOW_MM_A_DAY:g} mm a day are the least that is usual: rain without snow, maybe"
+        )
 
     if len(days) < FEWEST_DAYS:
         return
@@ -166,6 +210,40 @@ def _as_a_whole(year, columns, latitude_deg, interval, relative) -> Iterator[str
                 f"{100 * least:g} to {100 * most:g} are usual, and about 98 is the ground's, outgoing"
             )
             yield _other_unit(columns["longwave"], what, year, seconds, lambda v: least <= np.nanmean(v) / body <= most)
+
+
+def place_of_sun(light: pd.Series, interval: int) -> tuple[float, int] | None:
+    """Latitude, and the days by which the light is late, that fit the light [W m-2] best; None of less than a year.
+
+    By the hours of daylight; of daily means by the brightest of each half-month, which clear days have in common.
+    """
+    by_day = pd.DatetimeIndex(light.index).normalize()
+    means = light.groupby(by_day).mean()[light.notna().groupby(by_day).all()]
+    dates = pd.DatetimeIndex(means.index)
+    if len(dates) < DAYS_OF_A_YEAR:
+        return None
+    if interval != DAY:
+        seen = (light > DAYLIGHT_W_M2).groupby(by_day).sum()[dates] * interval / 60.0
+    else:
+        brightest = means.groupby(np.arange(len(means)) // HALF_MONTH).idxmax()
+        dates = pd.DatetimeIndex(brightest)
+        seen = means[dates]
+    seen, day, fits = seen.to_numpy(), dates.day_of_year.to_numpy() - 1, {}
+    for latitude in range(30, 81):
+        of_year = day_lengths(latitude) if interval != DAY else extraterrestrial(A_YEAR, latitude)
+        for late in range(-60, 61, 3):
+            expected = of_year[(day - late) % DAYS]
+            if interval == DAY:
+                expected = expected * (seen @ expected) / (expected @ expected)
+            fits[float(latitude), late] = np.abs(seen - expected).mean()
+    return min(fits, key=fits.__getitem__)
+
+
+def day_lengths(latitude_deg: float) -> np.ndarray:
+    """Hours of each day of a year in which the sun is higher than `SUNRISE_DEG`."""
+    tilt, latitude = TILT[:DAYS], math.radians(latitude_deg)
+    cosine = math.sin(math.radians(SUNRISE_DEG)) - math.sin(latitude) * np.sin(tilt)
+    return 24.0 / math.pi * np.arccos(np.clip(cosine / (math.cos(latitude) * np.cos(tilt)), -1.0, 1.0))
 
 
 def warmest_day(days: pd.Series) -> float:
@@ -240,7 +318,10 @@ def _of_sensors(weather, columns, latitude_deg, interval, possible) -> Iterator[
         most = np.full(len(first), float(most_days))
         if quantity == "humidity":
             most[weather["humidity"].to_numpy()[first] >= SATURATED] = SATURATED_DAYS
-        long = np.flatnonzero((rows * interval / DAY > most) & (rows >= FEWEST_SAME))
+        dead = values[first] == 0.0
+        if quantity == "shortwave" or (quantity == "humidity" and columns["humidity"].kind == "relative_humidity"):
+            most[dead] = DEAD_DAYS
+        long = np.flatnonzero((rows * interval / DAY > most) & ((rows >= FEWEST_SAME) | (most == DEAD_DAYS)))
         if len(long):
             k = long[0]
             unit = LIMITS[columns[quantity].kind if quantity in columns else quantity][0]
@@ -283,7 +364,7 @@ def _sun(starts: pd.DatetimeIndex, interval: int, latitude_deg: float) -> np.nda
     within = SUN_WITHIN_H + 0.5 * interval / 60.0  # solar time is told in whole intervals
     nearest_noon = np.clip(12.0, hour - within, hour + interval / 60.0 + within)
     day = starts.day_of_year.to_numpy()
-    tilt = np.array([declination(d) for d in range(366)])[day - 1]
+    tilt = TILT[day - 1]
     distance = np.array([distance_factor(d) for d in range(366)])[day - 1]
     latitude, angle = math.radians(latitude_deg), 2.0 * math.pi * (nearest_noon - 12.0) / 24.0
     height = math.sin(latitude) * np.sin(tilt) + math.cos(latitude) * np.cos(tilt) * np.cos(angle)

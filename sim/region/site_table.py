@@ -7,15 +7,23 @@ import pandas as pd
 
 import sim
 from sim.parameters import check_name, check_seed
-from sim.spin_up import CLASS_NAMES, INITIAL_LIMITS, LARGEST_STEM_KGC, check_initial
+from sim.spin_up import INITIAL_LIMITS, check_initial, most_biomass
 
 OTHERS = ("middle", "sampled")
 LATITUDE, LONGITUDE, SEED = "latitude_deg", "longitude_deg", "seed"
 DENSITY, BIOMASS = "density_stems_ha", "biomass_kgc_m2"
+UNITS = {"stems_ha": "stems ha-1", "kgc_m2": "kgC m-2", "layer_m": "m", "age_years": "yr", "fraction": "1"}
+
+
+def unit_of(stock: str) -> str:
+    """Unit of a first stock, by the end of its name."""
+    return next(unit for end, unit in UNITS.items() if stock.endswith(end))
+
+
 #: Columns that a table of sites may have: name -> (low, high, unit).
 COLUMNS = {
     **{name: (p.physical_low, p.physical_high, p.unit) for name, p in sim.SITE_PARAMETERS.items()},
-    **{name: (low, high, "") for name, (low, high) in INITIAL_LIMITS.items()},
+    **{name: (low, high, unit_of(name)) for name, (low, high) in INITIAL_LIMITS.items()},
     LONGITUDE: (-180.0, 360.0, "degE"),
     SEED: (0, 2**63 - 1, ""),
 }
@@ -61,18 +69,16 @@ def row_of(index: pd.Index, k: int) -> str:
 
 
 def check_biomass(table: pd.DataFrame, index: pd.Index) -> None:
-    """Refuse first biomass of no stems, or of more than `LARGEST_STEM_KGC` a stem."""
-    by_class = [name for name in CLASS_NAMES if name in table]
-    if BIOMASS not in table or not (by_class or DENSITY in table):
+    """Refuse first biomass of no stems, or of more than stems of their age hold."""
+    if BIOMASS not in table or (held := most_biomass(table)) is None:
         return
-    stems = table[by_class].sum(axis=1) if by_class else table[DENSITY]
-    most = stems * LARGEST_STEM_KGC * 1e-4
+    stems, most = held
     wrong = (table[BIOMASS] > most).to_numpy()
     if wrong.any():
         k = int(wrong.argmax())
         raise ValueError(
             f"sites: {row_of(index, k)}, column {BIOMASS} is {table[BIOMASS].iloc[k]:g}; of {stems.iloc[k]:g} stems/ha "
-            f"at most {most.iloc[k]:.4g} kgC/m2 is allowed, {LARGEST_STEM_KGC:g} kgC a stem"
+            f"at most {most.iloc[k]:.4g} kgC/m2 is allowed"
         )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import sim
 from sim.region.plan import Plan
 from sim.region.site_table import COLUMNS
+from sim.scenario import FIRST_YEAR
 from sim.spin_up import INITIAL_LIMITS
 from sim.state import RECORD
 
@@ -130,7 +131,13 @@ class Store:
             group.create_array(
                 coordinate(name), data=values, chunks=(number,), dimension_names=("stand",), attributes=units
             )
-        group.create_array("year", data=np.arange(plan.years), chunks=(plan.years,), dimension_names=("year",))
+        group.create_array(
+            "year",
+            data=FIRST_YEAR + np.arange(plan.years),
+            chunks=(plan.years,),
+            dimension_names=("year",),
+            attributes={"long_name": "year of the weather"},
+        )
         for name in (*plan.variables, "action"):
             unit, meaning = RECORD.get(name, ("1", name.replace("_", " ")))
             group.create_array(

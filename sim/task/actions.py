@@ -9,7 +9,15 @@ import numpy as np
 
 from sim.demography import AGE_CLASSES
 from sim.jit import uncompiled
-from sim.management import CONIFER_MIXES, DENSITY_CHANGES, NEGLIGIBLE_STEMS, NO_CHANGE, feasible_change
+from sim.management import (
+    CONIFER_MIXES,
+    DENSITY_CHANGES,
+    NEGLIGIBLE_STEMS,
+    NO_CHANGE,
+    NUM_ACTIONS,
+    check_actions,
+    feasible_change,
+)
 from sim.parameters import check_name
 from sim.task.observation import AGE_ENTRIES, SPECIES_AND_AGES, Reader, observation_rows
 
@@ -41,7 +49,11 @@ def valid_actions(density: np.ndarray, harvestable: np.ndarray) -> np.ndarray:
 
 
 def where_valid(actions: np.ndarray, masks: np.ndarray) -> np.ndarray:
-    """Actions (n,) where masks (n, 25) allow them, `NO_CHANGE` where they do not."""
+    """Actions (n,) where masks (n, 25) bool allow them, `NO_CHANGE` where they do not."""
+    masks = np.asarray(masks)
+    if masks.ndim != 2 or masks.shape[1] != NUM_ACTIONS or masks.dtype != bool:
+        raise ValueError(f"masks of shape {masks.shape}, {masks.dtype}: bool of shape (n, {NUM_ACTIONS}) is allowed")
+    actions = check_actions(actions, len(masks), of="masks")
     return np.where(masks[np.arange(len(actions)), actions], actions, NO_CHANGE)
 
 

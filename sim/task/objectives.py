@@ -255,7 +255,7 @@ def check_objectives(objectives: Sequence) -> tuple:
     """Objectives of an environment, each once: names of the paper's, and `Objective`s, of which some have a name."""
     allowed = (*PAPER_OBJECTIVES, *READY_OBJECTIVES)
     # a set has no order, and the reward vector would change its own from process to process
-    if isinstance(objectives, (str, set, frozenset)) or not np.iterable(objectives) or not len(objectives):
+    if isinstance(objectives, (str, dict, set, frozenset)) or not np.iterable(objectives) or not len(objectives):
         raise ValueError(f"objectives: a list or tuple of {', '.join(allowed)} and Objective, got {objectives!r}")
     for objective in objectives:
         if not isinstance(objective, Objective):

@@ -7,6 +7,7 @@ options, in the observation and in the last step's info.
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 
 ROUND_OFF = 1e-6  # by which given weights may miss the sum of 1
 
@@ -16,6 +17,7 @@ def check_weights(value, objectives: int, what: str = "preference") -> np.ndarra
 
     Weights are kept as given. Raises ValueError that names `what`, the value and what is allowed.
     """
+    _refuse_labels(value, what)
     if objectives == 2 and not _is_sequence(value):
         if not _is_number(value) or not 0.0 <= value <= 1.0:
             raise ValueError(f"{what}: a number in [0, 1] is allowed, got {value!r}")
@@ -37,6 +39,7 @@ def spread_weights(value, number: int, objectives: int) -> list:
     """
     if value is None:
         return [None] * number
+    _refuse_labels(value, "preference")
     several = _is_sequence(value)
     for_all = not several if objectives == 2 else several and all(_is_number(weight) for weight in value)
     if for_all:
@@ -48,6 +51,10 @@ def spread_weights(value, number: int, objectives: int) -> list:
 
 def draw_weights(generator: np.random.Generator, objectives: int) -> np.ndarray:
     """Weights (objectives,), uniform on the simplex: the gaps that objectives - 1 uniform draws leave in [0, 1]."""
+    if not isinstance(generator, np.random.Generator):
+        raise ValueError(f"generator: numpy.random.default_rng(seed) is allowed, got {generator!r}")
+    if isinstance(objectives, bool) or not isinstance(objectives, (int, np.integer)) or objectives < 1:
+        raise ValueError(f"objectives: a positive integer is allowed, got {objectives!r}")
     cuts = np.sort(generator.random(objectives - 1))
     return np.diff(cuts, prepend=0.0, append=1.0)
 
@@ -65,6 +72,14 @@ def shown(weights: np.ndarray):
 
 def _is_number(value) -> bool:
     return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+
+
+def _refuse_labels(value, what: str) -> None:
+    """Refuse a Series whose labels say another order than its numbers have, for all that we know."""
+    if isinstance(value, pd.Series) and value.index.tolist() != list(range(len(value))):
+        raise ValueError(
+            f"{what}: a Series labelled {value.index.tolist()}, which are not read; its .tolist() is allowed"
+        )
 
 
 def _is_sequence(value) -> bool:
