@@ -213,15 +213,11 @@ if __name__ == "__main__":
         protocol.fail("--per-objective-advantages is for --scalarization linear: it weighs each advantage by itself")
     task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns
+    loss_columns = ("policy_loss", "value_loss", "entropy", "old_approx_kl", "approx_kl", "clip_fraction")
     update_columns = (
         "iteration",
         "global_step",
-        "policy_loss",
-        "value_loss",
-        "entropy",
-        "old_approx_kl",
-        "approx_kl",
-        "clip_fraction",
+        *loss_columns,
         "explained_variance",
     )
 
@@ -359,7 +355,7 @@ if __name__ == "__main__":
             # TRY NOT TO MODIFY: record the update; means over its minibatches
             row = {"iteration": iteration, "global_step": global_step}
             if losses:
-                row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0), strict=True))
+                row |= dict(zip(loss_columns, np.mean(losses, axis=0), strict=True))
             if len(y_true) > 1:
                 row["explained_variance"] = (1 - (y_true - y_pred).var(dim=0).sum() / y_true.var(dim=0).sum()).item()
 

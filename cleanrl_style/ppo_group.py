@@ -246,19 +246,17 @@ if __name__ == "__main__":
     task = protocol.make_task(args, hide_site=args.hide_site)
     if args.num_envs == 1 and 1 in (args.rollout_steps, args.total_timesteps % args.rollout_steps):
         protocol.fail(f"--total-timesteps {args.total_timesteps}: a rollout of one step has no deviation to divide by")
+    if task.fixes_preference:
+        protocol.fail(f"--env-id {args.env_id}: it has a fixed_preference, and a group is spread over all")
     episode_columns = task.episode_columns
     gae_lambda = args.gae_lambda or [1.0 if name == "thaw" else 0.95 for name in task.objectives]
     if len(gae_lambda) not in (1, task.num_objectives):
         protocol.fail(f"--gae-lambda: 1 number or {task.num_objectives} are allowed, not {list(gae_lambda)}")
+    loss_columns = ("policy_loss", "value_loss", "entropy", "old_approx_kl", "approx_kl", "clip_fraction")
     update_columns = (
         "iteration",
         "global_step",
-        "policy_loss",
-        "value_loss",
-        "entropy",
-        "old_approx_kl",
-        "approx_kl",
-        "clip_fraction",
+        *loss_columns,
         "explained_variance",
     )
 
@@ -415,7 +413,7 @@ if __name__ == "__main__":
             # TRY NOT TO MODIFY: record the update; means over its minibatches
             row = {"iteration": iteration, "global_step": global_step}
             if losses:
-                row |= dict(zip(update_columns[2:8], np.mean(losses, axis=0), strict=True))
+                row |= dict(zip(loss_columns, np.mean(losses, axis=0), strict=True))
             if len(y_true) > 1:
                 row["explained_variance"] = (1 - (y_true - y_pred).var(dim=0).sum() / y_true.var(dim=0).sum()).item()
 

@@ -1,5 +1,6 @@
 """A trained policy, loaded again from its run's folder, plays as it did in the run's own evaluation."""
 
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -38,9 +39,39 @@ def test_the_agent_of_a_script_elsewhere(tmp_path):
     path = tmp_path / "ppo_own.py"
     path.write_text((ROOT / "cleanrl_style" / "ppo_gated.py").read_text())
     train(path, tmp_path / "run")
+    evaluate_again(tmp_path / "run", protocol.load_policy(tmp_path / "run"))  # its config.json says where
+    path = path.rename(tmp_path / "moved.py")
     with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_own.py to import; script=path"):
         protocol.load_policy(tmp_path / "run")
     evaluate_again(tmp_path / "run", protocol.load_policy(tmp_path / "run", script=path))
+
+
+def test_an_agent_may_ask_for_the_number_of_actions_and_for_what_lies_beside_its_script(tmp_path, monkeypatch):
+    text = (ROOT / "cleanrl_style" / "ppo_gated.py").read_text()
+    text = text.replace("import torch.nn as nn\n", "import torch.nn as nn\nfrom beside import WIDTH\n")
+    text = text.replace("2 + 15 + 10)", "2 + envs.single_action_space.n)").replace("64)", "WIDTH)")
+    assert text.count("WIDTH") > 2 and "single_action_space" in text
+    (tmp_path / "beside.py").write_text("WIDTH = 64\n")
+    (tmp_path / "ppo_wide.py").write_text(text)
+    with monkeypatch.context() as as_python:
+        as_python.syspath_prepend(tmp_path)
+        train(tmp_path / "ppo_wide.py", tmp_path / "run")
+    sys.modules.pop("beside")
+    assert protocol.load_policy(tmp_path / "run").size == 3
+
+
+def test_a_policy_that_could_not_be_loaded_is_not_written(tmp_path):
+    text = (ROOT / "cleanrl_style" / "ppo_gated.py").read_text()
+    text = text.replace("def __init__(self, envs, num_values=1)", "def __init__(self, envs, num_values=1, act=nn.Tanh)")
+    text = text.replace("num_values=num_values)", "num_values=num_values, act=nn.Tanh)")
+    (tmp_path / "ppo_act.py").write_text(text)
+    with pytest.raises(TypeError, match="run.save_policy: numbers, texts and tuples of them are allowed"):
+        train(tmp_path / "ppo_act.py", tmp_path / "run")
+
+
+def test_the_agent_of_one_preference_knows_it():
+    observations = [protocol.load_policy("eupg_fixed_lambda").task().make().reset(seed=seed)[0] for seed in (1, 2)]
+    assert [one[0] for one in observations] == [0.5, 0.5]
 
 
 def test_an_agent_of_another_network_is_refused(tmp_path):
@@ -87,7 +118,7 @@ def test_a_script_with_a_dot_in_its_name_is_named(tmp_path):
     saved = torch.load(policy_file("ppo_gated"), weights_only=True)
     saved["run"]["script"] = "ppo_v1.2"
     torch.save(saved, tmp_path / "policy.pt")
-    with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_v1.2.py to import; script=path, .*--script"):
+    with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_v1.2.py to import; script=path .*--script"):
         protocol.load_policy(tmp_path)
     assert protocol.load_policy(tmp_path, ROOT / "cleanrl_style" / "ppo_gated.py").script == "ppo_v1.2"
 

@@ -1,5 +1,6 @@
 """`python -m boreal_env`, policies by name, and the commands that ship and score them."""
 
+import json
 import pickle
 import re
 import shutil
@@ -180,8 +181,11 @@ def test_a_finished_run_that_is_damaged_is_not_called_finished(run, tmp_path, na
     assert run_folder.damage_of(folder, 5) == name
 
 
-def test_what_trains_without_a_checkpoint_is_finished_without_a_policy(run, tmp_path):
-    shutil.copytree(run, tmp_path / "run", ignore=shutil.ignore_patterns("*.pt"))
+def test_what_saves_no_policy_is_finished_without_one(run, tmp_path):
+    shutil.copytree(run, tmp_path / "run", ignore=shutil.ignore_patterns("policy.pt"))
+    config = json.loads((run / "config.json").read_text())
+    assert config.pop("policy") == "policy.pt"
+    (tmp_path / "run" / "config.json").write_text(json.dumps(config))
     assert run_folder.damage_of(tmp_path / "run", 5) is None
 
 

@@ -2,6 +2,7 @@ import contextlib
 import json
 import signal
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -322,6 +323,12 @@ def test_folder_names_say_what_is_not_default(tmp_path, monkeypatch):
     ]:
         args = Arguments(**changes)
         assert str(protocol.Run(args, protocol.make_task(args), "script").folder) == f"runs/script/{name}/seed1"
+
+
+def test_a_name_is_one_folder_whatever_a_flag_of_ones_own_holds(tmp_path):
+    changed = {"teacher": "../../runs/x/policy.pt", "layers": ("wide", "deep"), "file": Path("a/b")}
+    name = run_folder.folder_name("toy-v0", changed)
+    assert name == "toy-v0-teacher=..-..-runs-x-policy.pt-layers=wide,deep-file=a-b"
 
 
 def test_a_name_too_long_for_a_folder_ends_in_its_hash():

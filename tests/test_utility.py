@@ -1,6 +1,7 @@
 """What a return is worth: the weighted sum or Chebyshev's, in training, in the evaluation and in the score."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,9 +12,9 @@ from test_score import PLANS, WEIGHTS, evaluation
 from cleanrl_style import protocol
 from cleanrl_style.eupg_var_lambda import compute_utilities
 from cleanrl_style.protocol import arguments, score
-from cleanrl_style.protocol.utility import LINEAR, Utility
+from cleanrl_style.protocol.utility import LINEAR, SCALARIZATIONS, Chebyshev, Utility
 
-IDEAL = Utility((4.0, 2.0))
+IDEAL = Chebyshev((4.0, 2.0))
 RETURNS = np.random.default_rng(0).normal(0, 3, (20, 2))
 
 
@@ -21,7 +22,28 @@ def test_chebyshev_is_the_largest_weighted_shortfall():
     assert IDEAL(np.array([3.0, 1.0]), np.array([0.25, 0.75])) == -0.75
     assert IDEAL(np.array([0.0, 1.9]), np.array([0.25, 0.75])) == -1.0
     assert IDEAL(np.array([5.0, -9.0]), np.array([1.0, 0.0])) == 1.0  # an objective of weight 0 does not count
-    assert IDEAL.scalarization == "chebyshev" and LINEAR.scalarization == "linear"
+    assert {"linear": type(LINEAR), "chebyshev": type(IDEAL)} == SCALARIZATIONS
+
+
+class Soft(Utility):
+    """A smooth least return."""
+
+    def __call__(self, returns, weights):
+        return -np.log((weights * np.exp(-returns)).sum(axis=-1))
+
+
+def test_a_utility_of_ones_own_is_what_training_and_score_are_of(monkeypatch):
+    weights = np.array([0.3, 0.7])
+    assert Soft().gain(RETURNS[0], RETURNS[1], weights) == Soft()(RETURNS[0] + RETURNS[1], weights) - Soft()(
+        RETURNS[0], weights
+    )
+    monkeypatch.setitem(SCALARIZATIONS, "soft", Soft)
+    given = {"env_id": "boreal-balanced-v0", "mode": None, "site_seed": None, "thaw_formulation": None}
+    args = SimpleNamespace(**given, eval_weights=None, eval_episodes=2, scalarization="soft")
+    assert isinstance(arguments.make_task(args).utility, Soft)
+    args.scalarization = "softer"
+    with pytest.raises(SystemExit, match="--scalarization softer: allowed are linear, chebyshev, soft"):
+        arguments.make_task(args)
 
 
 @pytest.mark.parametrize("utility", [LINEAR, IDEAL])
@@ -37,14 +59,14 @@ def test_chebyshev_finds_what_no_weighted_sum_does():
     front, all_weights = np.array([[4.0, 0.0], [1.7, 1.7], [0.0, 4.0]]), np.linspace(0, 1, 101)
     weights = np.stack([all_weights, 1 - all_weights], axis=1)
     found = {
-        utility.scalarization: set(np.array([utility(front, one).argmax() for one in weights]))
-        for utility in (LINEAR, Utility((4.0, 4.0)))
+        utility.title: set(np.array([utility(front, one).argmax() for one in weights]))
+        for utility in (LINEAR, Chebyshev((4.0, 4.0)))
     }
-    assert found == {"linear": {0, 2}, "chebyshev": {0, 1, 2}}
+    assert found == {LINEAR.title: {0, 2}, Chebyshev.title: {0, 1, 2}}
 
 
 def test_the_score_is_in_the_evaluation_s_own_utility():
-    ideal = Utility((4.0, 6.0))
+    ideal = Chebyshev((4.0, 6.0))
     worth = {
         plan: [ideal(score.returns_of(rows), one).mean() for one in WEIGHTS] for plan, rows in PLANS.groupby("plan")
     }
@@ -115,7 +137,7 @@ def test_a_run_logs_its_own_utility(tmp_path, script):
         *("--env-id", "toy_env:toy-v0", "--run-dir", tmp_path, "--num-envs", 2, "--total-timesteps", 40),
         *("--scalarization", "chebyshev", "--ideal-point", 10, 8, "--eval-episodes", 2, *rollout, *weights),
     )
-    utility = Utility((10.0, 8.0))
+    utility = Chebyshev((10.0, 8.0))
     for name in ("episodes", "evaluation"):
         table = pd.read_csv(tmp_path / f"{name}.csv")
         expected = utility(score.returns_of(table), score.weights_of(table))

@@ -47,6 +47,8 @@ def draw(figure, results) -> None:
         edges = np.linspace(0, 1, BINS + 1)
         middles = stands.conifer_fraction + edges[1] / 2
         number = {"weights": stands.episodes, "density": True}
+        if not stands.episodes.any():
+            continue
         training.hist(middles, edges, **number, histtype="step", color=method.colour)
     finish(training, xlabel="conifer fraction after 50 years", ylabel="density of episodes")
     for k, method in enumerate(learners(evaluation, results)):

@@ -174,14 +174,14 @@ def main(script: str, args: Args, learn: Callable, samples: bool, check: Callabl
 
     learn : Session -> policy, a function of weights (n, m), observations (n, d) without the preference, masks (n, 25)
     and accrued returns (n, m) that gives action probabilities (n, 25). samples : whether they are a distribution; if
-    not, the sampled policy is the greedy one, and is played once. check : args -> None, ends the script with one line
-    for a bad value before the run begins.
+    not, the sampled policy is the greedy one, and is played once. check : (args, task) -> None, ends the script with
+    one line for a bad value before the run begins.
     """
     task = protocol.make_task(args)
     if not task.boreal or task.masks is None:
         protocol.fail(f"--env-id {args.env_id}: a boreal environment that observes the stand is allowed")
     if check is not None:
-        check(args)
+        check(args, task)
     tables = {"episodes": task.episode_columns, "cost": COST_COLUMNS}
     with protocol.Run(args, task, script, plays_validation=False, **tables) as run:
         random.seed(args.seed)

@@ -104,7 +104,7 @@ def rollout(args) -> tuple[int, int]:
     return steps, share // steps if steps else 0
 
 
-def check(args) -> None:
+def check(args, task) -> None:
     """Refuse what does not go together."""
     weights = len(args.eval_weights)
     if weights * args.num_envs > protocol.MAX_ENVS:

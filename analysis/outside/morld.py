@@ -113,7 +113,7 @@ def learn(session: Session):
     return policy
 
 
-def check(args: MORLDArgs) -> None:
+def check(args: MORLDArgs, task) -> None:
     """Refuse a budget that the last of its rounds would exceed."""
     if args.total_timesteps % min(args.exchange_every, args.total_timesteps):
         fail(

@@ -58,12 +58,16 @@ from analysis.outside.common import INVALID, NoEnv, Session, main, valid_actions
 from cleanrl_style import protocol
 
 
-def learn(session: Session):
-    """Train; the policy is given the command that the library gives its own."""
-    args, task, env = session.args, session.task, session.env()
+def check(args, task) -> None:
+    """Refuse a training of fewer steps than its first two rounds have."""
     least = (args.num_er_episodes + args.num_step_episodes) * task.years
     if args.total_timesteps < least:
         protocol.fail(f"--total-timesteps {args.total_timesteps}: at least {least}, the first two rounds of episodes")
+
+
+def learn(session: Session):
+    """Train; the policy is given the command that the library gives its own."""
+    args, task, env = session.args, session.task, session.env()
 
     class Masked(DiscreteActionsDefaultModel):
         """The library's network without the probability of invalid actions."""
@@ -113,4 +117,4 @@ def learn(session: Session):
 
 
 if __name__ == "__main__":
-    main(__file__, args, learn, samples=True)
+    main(__file__, args, learn, samples=True, check=check)

@@ -19,7 +19,7 @@ from analysis import paths
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts, reference
 from cleanrl_style.protocol.arguments import ideal_point
-from cleanrl_style.protocol.utility import LINEAR, Utility
+from cleanrl_style.protocol.utility import LINEAR, Chebyshev, Utility
 
 SITE = 1037049714
 WEIGHTS = np.linspace(0, 1, 101)
@@ -55,7 +55,10 @@ def study(task: protocol.Task, seeds: list[int]) -> tuple[pd.DataFrame, dict[str
     front = pd.DataFrame(
         {"plan": [plans[k] for k in order], "carbon_gain": gains[order, 0], "thaw_gain": gains[order, 1]}
     )
-    choices = {one.scalarization: taken(returns[order], one) for one in (LINEAR, Utility(ideal_point(task)))}
+    choices = {
+        name: taken(returns[order], one)
+        for name, one in (("linear", LINEAR), ("chebyshev", Chebyshev(ideal_point(task))))
+    }
     for name, chosen in choices.items():
         front[name] = np.bincount(chosen, minlength=len(front))
     return front, choices

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Discrete
 
 from cleanrl_style.flags import policy_file
 from cleanrl_style.protocol.arguments import make_task
@@ -85,9 +85,13 @@ class Policy:
         """That environment with the arguments of its training; `task().make()` is one. ValueError if it is not here."""
         arguments = SimpleNamespace(**{**self.arguments, "scalarization": "linear", "ideal_point": None})
         try:
-            return make_task(arguments, hide_site=self.arguments.get("hide_site", False))
+            task = make_task(arguments, hide_site=self.arguments.get("hide_site", False))
         except SystemExit as end:  # as a script ends; this is none
             raise ValueError(f"{self.name}: {str(end).removeprefix('error: ')}") from end
+        preference = self.arguments.get("preference")
+        if preference is None or not task.boreal:
+            return task
+        return replace(task, env_kwargs={**task.env_kwargs, "fixed_preference": preference})
 
 
 def load_policy(run_or_name, script=None) -> Policy:
@@ -126,26 +130,42 @@ def load_policy(run_or_name, script=None) -> Policy:
     except (OSError, zipfile.BadZipFile) as error:
         what = "cut short, or no policy that a script of this project has written"
         raise ValueError(f"{path}: {what} ({error})") from error
-    module = _script_module(run["script"], script)
-    space = Box(-np.inf, np.inf, tuple(saved["observation_shape"]), np.float32)
+    module = _script_module(run["script"], script or own_script(path.parent))
+    envs = spaces_alone(saved["observation_shape"])
     lacking = [part for part in ("Agent", "make_policy") if not hasattr(module, part)]
     if lacking:
         raise ValueError(f"{module.__file__}: it has no {' and no '.join(lacking)}, so it trained no policy")
     try:
-        agent = module.Agent(SimpleNamespace(single_observation_space=space), **saved["arguments"])
+        agent = module.Agent(envs, **saved["arguments"])
         # a policy that ships is without its critic, which chooses nothing
         critic = {name: value for name, value in agent.state_dict().items() if name.startswith("critic.")}
         agent.load_state_dict({**critic, **saved["agent"]})
-    except (RuntimeError, TypeError) as error:
+    except (RuntimeError, TypeError, AttributeError, NameError) as error:
         trained_it = f"another version of {run['script']}.py than {module.__file__} trained it"
         raise ValueError(f"{path}: {trained_it}, of another network or with other arguments of Agent") from error
     if not all(weights.isfinite().all() for weights in agent.state_dict().values()):
         raise ValueError(f"{path}: a weight of its network is not finite, so its training went wrong")
-    probabilities, (size,) = module.make_policy(agent), space.shape
+    probabilities, (size,) = module.make_policy(agent), envs.single_observation_space.shape
     unknown = np.full((1, _objectives(run["arguments"])), np.nan)
     looks_back = bool(np.isnan(probabilities(np.zeros((1, size), np.float32), np.ones((1, 25), bool), unknown)).any())
     source = str(path.absolute()), None if script is None else str(Path(script).absolute())
     return Policy(str(run_or_name), run["script"], run["arguments"], probabilities, size, looks_back, source)
+
+
+def spaces_alone(observation_shape) -> SimpleNamespace:
+    """What an Agent is made with in place of environments: their spaces."""
+    space = Box(-np.inf, np.inf, tuple(observation_shape), np.float32)
+    return SimpleNamespace(single_observation_space=space, single_action_space=Discrete(25))
+
+
+def own_script(folder: Path) -> Path | None:
+    """Where the script lies that made a run, by the run's config.json, if it lies there and not in cleanrl_style/."""
+    try:
+        named = json.loads((folder / "config.json").read_text(encoding="utf-8")).get("file")
+    except (OSError, ValueError, AttributeError):
+        return None
+    path = Path(__file__).parents[2] / named if isinstance(named, str) else None  # an absolute one stays what it is
+    return path if path is not None and path.is_file() else None
 
 
 def _load_again(name: str, file: str, script: str | None) -> Policy:
@@ -174,7 +194,8 @@ def _script_module(name: str, path) -> ModuleType:
         # a dot in its name would be taken for a package's
         if "." in name or importlib.util.find_spec(f"cleanrl_style.{name}") is None:
             raise FileNotFoundError(
-                f"no cleanrl_style/{name}.py to import; script=path, on a command line --script, names another"
+                f"no cleanrl_style/{name}.py to import; script=path of load_policy, or --script of watch and "
+                "score_policy, names another"
             )
         return importlib.import_module(f"cleanrl_style.{name}")
     return load_script(name, path)
@@ -186,10 +207,14 @@ def load_script(name: str, path) -> ModuleType:
     if spec is None or not Path(path).exists():
         raise FileNotFoundError(f"script {path}: no Python file")
     module = sys.modules[name] = importlib.util.module_from_spec(spec)  # where texts of its annotations are looked up
+    folder = str(Path(path).parent.absolute())
+    sys.path.insert(0, folder)  # as python has it, for what lies beside the script
     try:
         spec.loader.exec_module(module)
     except SyntaxError as error:
         raise ValueError(f"script {error.filename}, line {error.lineno}: {error.msg}") from error
     except ImportError as error:
         raise ValueError(f"script {path}: {error}") from error
+    finally:
+        sys.path.remove(folder)
     return module

@@ -22,7 +22,7 @@ from cleanrl_style.protocol.fronts import evaluation_weights, return_columns
 from cleanrl_style.protocol.reference import reference_returns
 from cleanrl_style.protocol.sites import evaluation_seeds, published_seeds
 from cleanrl_style.protocol.task import Task
-from cleanrl_style.protocol.utility import Utility
+from cleanrl_style.protocol.utility import SCALARIZATIONS, Chebyshev
 
 ONE_SITE_EPISODES = 32  # that an ideal point is taken from, where a task has one site under many weathers
 DEFAULT_STEPS = {"generalist": 300_000, "site-specific": 100_000}  # of a training, by the environment's mode
@@ -78,13 +78,17 @@ def make_task(args, *, preference=None, hide_site: bool = False) -> Task:
     for package in getattr(args, "track", ()):
         if importlib.util.find_spec(package) is None:
             fail(f"--track {package}: the package is not installed (pip install {package})")
-    if getattr(args, "scalarization", "linear") == "chebyshev":
+    scalarization = getattr(args, "scalarization", "linear")
+    if scalarization not in SCALARIZATIONS:
+        allowed = f"allowed are {', '.join(SCALARIZATIONS)} (cleanrl_style/protocol/utility.py)"
+        fail(f"--scalarization {scalarization}: {allowed}")
+    if SCALARIZATIONS[scalarization] is Chebyshev:
         if any(scale != 1.0 for scale in getattr(args, "reward_scales", ())):
             fail("--reward-scales: the ideal point of --scalarization chebyshev is of rewards as they are: 1 each")
-        return dataclasses.replace(task, utility=Utility(ideal_point(task, args.ideal_point)))
+        return dataclasses.replace(task, utility=Chebyshev(ideal_point(task, args.ideal_point)))
     if getattr(args, "ideal_point", None) is not None:
         fail("--ideal-point is for --scalarization chebyshev")
-    return task
+    return dataclasses.replace(task, utility=SCALARIZATIONS[scalarization]())
 
 
 def ideal_point(task: Task, given=None) -> tuple[float, ...]:

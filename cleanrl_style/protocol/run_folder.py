@@ -12,6 +12,7 @@ import os
 import pickle
 import platform
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -37,6 +38,7 @@ from cleanrl_style.protocol.reference import physics_name, reference_returns
 from cleanrl_style.protocol.score import Comparison
 from cleanrl_style.protocol.summary import draw_summary, print_course, print_score, print_table
 from cleanrl_style.protocol.task import Task
+from cleanrl_style.protocol.utility import Chebyshev
 
 try:
     import fcntl
@@ -117,9 +119,10 @@ class Run:
             "arguments": {k: value for k, value in vars(args).items() if k not in FREE_ARGUMENTS},
             "not_default": changed,
             "primary_policy": PRIMARY,
-            **({"ideal_point": task.utility.ideal} if task.utility.ideal else {}),
+            **({"ideal_point": task.utility.ideal} if isinstance(task.utility, Chebyshev) else {}),
             "versions": versions(),
             "commit": commit(),
+            "file": place_of(Path(script)),
             "source": hashlib.sha256(Path(script).read_bytes()).hexdigest()[:16] if Path(script).is_file() else None,
             "physics": physics_name(),
         }
@@ -183,7 +186,7 @@ class Run:
 
     def _write_config(self) -> None:
         with replacing(self.folder / "config.json") as file:
-            file.write(json.dumps(self.config, indent=2).encode() + b"\n")
+            file.write(json.dumps(self.config, indent=2, default=str).encode() + b"\n")
 
     def _compare(self, config_file: Path) -> None:
         """Exit if the folder's run has other arguments, or is finished; warn if it was made by other code."""
@@ -193,7 +196,7 @@ class Run:
             code_there = {**config["versions"], **{name: config.get(name) for name in CODE}}
         except (ValueError, KeyError, TypeError) as error:
             fail(f"{config_file} is damaged ({error!r}); --overwrite starts over")
-        here = json.loads(json.dumps({"script": self.script, **self.config["arguments"]}))
+        here = json.loads(json.dumps({"script": self.script, **self.config["arguments"]}, default=str))
         if there != here:
             fail(
                 f"{self.folder} holds a run with other arguments: {differences(there, here)} "
@@ -202,8 +205,7 @@ class Run:
         if (self.folder / "evaluation.csv").exists():
             damaged = damage_of(self.folder, len(self.args.eval_weights))
             if damaged:
-                unsaved = " (removed, or never written: run.save_policy does)" if damaged == "policy.pt" else ""
-                what = "damaged" if (self.folder / damaged).exists() else f"missing{unsaved}"
+                what = "damaged" if (self.folder / damaged).exists() else "missing"
                 fail(f"{self.folder / damaged} is {what}; --overwrite starts over")
             print(f"{self.folder}: this run is finished (--overwrite starts over)")
             sys.exit(0)
@@ -369,6 +371,7 @@ class Run:
 
         buffer = io.BytesIO()
         shape = self.envs.single_observation_space.shape
+        arguments = {name: one.item() if isinstance(one, np.generic) else one for name, one in arguments.items()}
         try:
             with torch.random.fork_rng(devices=[]):
                 type(agent)(self.envs, **arguments).load_state_dict(agent.state_dict())
@@ -376,11 +379,22 @@ class Run:
             own = "run.save_policy(agent, name=value, ..) wants every argument that the Agent was made with after envs"
             raise TypeError(f"{own}, not {arguments}: they make another network") from error
         own = {name: value for name, value in self.config["arguments"].items() if name != "vectorization"}
-        run = json.loads(json.dumps({"script": self.script, "arguments": own}))  # the same bytes, async or lockstep
+        run = json.loads(
+            json.dumps({"script": self.script, "arguments": own}, default=str)
+        )  # the same bytes, async or lockstep
         policy = {"agent": agent.state_dict(), "arguments": arguments, "observation_shape": shape, "run": run}
         torch.save(policy, buffer)
-        with self._writing(), replacing(self.folder / "policy.pt") as file:
-            file.write(buffer.getvalue())
+        try:
+            torch.load(io.BytesIO(buffer.getvalue()), weights_only=True)
+        except pickle.UnpicklingError as error:
+            raise TypeError(
+                f"run.save_policy: numbers, texts and tuples of them are allowed, not {arguments}"
+            ) from error
+        with self._writing():
+            with replacing(self.folder / "policy.pt") as file:
+                file.write(buffer.getvalue())
+            self.config["policy"] = "policy.pt"
+            self._write_config()
 
     def finish(self, evaluation: pd.DataFrame, years: pd.DataFrame | None) -> None:
         """Write the evaluation and the picture, print the table, and so declare the run finished."""
@@ -484,9 +498,16 @@ def damage_of(folder: Path, weights: int) -> str | None:
         whole = False
     if not whole:
         return evaluation.name
-    # fixed strategies and other libraries' algorithms leave neither a checkpoint nor a policy
-    trained = policy.exists() or (folder / "checkpoint.pt").exists()
-    return policy.name if trained and not zipfile.is_zipfile(policy) else None
+    saved = policy.exists() or "policy" in json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    return policy.name if saved and not zipfile.is_zipfile(policy) else None
+
+
+def place_of(script: Path) -> str | None:
+    """The script's file, relative to the project where it lies in it; None of a name alone."""
+    if not script.is_file():
+        return None
+    file, root = script.resolve(), Path(__file__).resolve().parents[2]
+    return file.relative_to(root).as_posix() if file.is_relative_to(root) else str(file)
 
 
 def remove(path: Path) -> None:
@@ -508,11 +529,14 @@ def differences(there: dict, here: dict) -> str:
 
 def folder_name(env_id: str, changed: dict) -> str:
     """Environment and name=value of what is not default; the end of a name too long for file systems is its hash."""
-    values = {
-        name: ",".join(f"{v:g}" for v in np.ravel(value)) if isinstance(value, tuple) else value
-        for name, value in changed.items()
-    }
-    name = "-".join([env_id.split(":")[-1].replace("/", "-"), *(f"{k}={v}" for k, v in values.items())])
+
+    def shown(value) -> str:
+        if not isinstance(value, tuple):
+            return str(value)
+        return ",".join(f"{one:g}" if isinstance(one, (int, float)) else str(one) for one in np.ravel(value).tolist())
+
+    name = "-".join([env_id.split(":")[-1], *(f"{k}={shown(value)}" for k, value in changed.items())])
+    name = re.sub(r"[/\\\s]+", "-", name)  # one folder
     if len(name.encode()) <= LONGEST_NAME:
         return name
     digest = hashlib.sha256(name.encode()).hexdigest()[:12]

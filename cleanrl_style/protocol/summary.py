@@ -61,7 +61,7 @@ def print_score(objectives, comparison: Comparison) -> None:
     scores = {name: f"{comparison.score(name):z.0f}" for name in shown}
     policies = ", ".join(f"{scores[policy]} {policy}" for policy in sorted(POLICIES, key=lambda name: name != PRIMARY))
     print(f"\nSCORE {policies}: 0 is to do nothing, 100 the best plan that does the same every year")
-    what = "reward" if comparison.utility.ideal is None else "Chebyshev's utility"
+    what = comparison.utility.title
     print(f"\nGain: {what} of an episode above that of doing nothing, mean of {episodes} evaluation episodes")
     whose = objectives[0] if len(objectives) == 2 else ""
     if len(objectives) > 2:

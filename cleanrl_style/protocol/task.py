@@ -38,6 +38,7 @@ class Task:
     masks: Callable | None = None  # valid actions as a function of observations; None: the environment is called
     site_entries: tuple[int, ...] = ()  # entries of the observation that are site parameters
     observes_preference: bool = True  # at the front of the observation, all weights but the last
+    fixes_preference: bool = False  # the environment plays one preference alone
     preference: np.ndarray | None = field(default=None, compare=False)  # of every training episode; None: drawn
     utility: Utility = LINEAR  # of an episode's return
 
@@ -69,6 +70,7 @@ class Task:
                 thaw_formulation=one.thaw_formulation,
                 years=one.years,
                 draws_sites=draws_sites,
+                fixes_preference=env.spec.kwargs.get("fixed_preference") is not None,
                 shifts=shifts_of(env.spec.kwargs.get("boundary", "sampled")) if draws_sites else (),
                 masks=one.mask_function() if bare else None,  # a wrapper may change what is observed
                 observes_preference=all(name.startswith("preference") for name in front),
@@ -158,7 +160,7 @@ class Task:
 
     def make(self, **kwargs) -> gym.Env:
         """One environment."""
-        return gym.make(self.env_id, disable_env_checker=True, **self.env_kwargs, **kwargs)
+        return gym.make(self.env_id, disable_env_checker=True, **{**self.env_kwargs, **kwargs})
 
     def make_lockstep(self, num_envs: int, **kwargs) -> gym.vector.VectorEnv:
         """Environments in lockstep, of a task that `has_lockstep`."""
@@ -214,6 +216,6 @@ def _check_spaces(env: gym.Env) -> tuple[str, ...]:
         raise ValueError("the environment needs reward_dim, 2 or more, and action_masks()")
     unnamed = ("carbon", "thaw") if number == 2 else tuple(f"objective_{k}" for k in range(1, number + 1))
     names = tuple(getattr(one, "objective_names", unnamed))
-    if len(names) != number or len(set(names)) < number:
-        raise ValueError(f"objective_names must be {number} different names, not {names}")
+    if len(names) != number or len(set(names)) < number or "scalarized" in names:
+        raise ValueError(f"objective_names must be {number} different names, none of them scalarized, not {names}")
     return names

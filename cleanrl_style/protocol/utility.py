@@ -1,34 +1,25 @@
 """What returns are worth at a preference: the utility that a training maximises and its evaluation reports."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from cleanrl_style.protocol.fronts import scalarize
 
-SCALARIZATIONS = ("linear", "chebyshev")
 
-
-@dataclass(frozen=True)
 class Utility:
-    """The weighted sum of returns or, with an ideal point, Chebyshev's: minus the largest weighted shortfall from it.
+    """The utility of an episode's return; another one is a class with its own `__call__` in `SCALARIZATIONS`.
 
-    ideal : a return for each objective, fixed by the task. An objective of weight 0 does not count. Chebyshev's is not
-    linear: it is the utility of each episode's own return (expected scalarised return, ESR), and means are over those.
+    What is not linear is the utility of each episode's own return (expected scalarised return, ESR), and means are over
+    those.
     """
 
-    ideal: tuple[float, ...] | None = None
-
-    @property
-    def scalarization(self) -> str:
-        """Its name among `SCALARIZATIONS`."""
-        return SCALARIZATIONS[self.ideal is not None]
+    title: ClassVar[str] = "utility"  # as a run prints it
 
     def __call__(self, returns: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Utility (...) of returns (..., m) at weights (..., m)."""
-        if self.ideal is None:
-            return scalarize(returns, weights)
-        return -np.where(weights > 0, weights * (np.array(self.ideal) - returns), -np.inf).max(-1)
+        raise NotImplementedError
 
     def gain(self, before: np.ndarray, added: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """What `added` (..., m) is worth to who has `before` (..., m).
@@ -36,9 +27,39 @@ class Utility:
         Year by year of an episode these sum to the utility of its return less that of none, so that they can be
         rewards.
         """
-        if self.ideal is None:
-            return scalarize(added, weights)
         return self(before + added, weights) - self(before, weights)
 
 
-LINEAR = Utility()
+@dataclass(frozen=True)
+class Linear(Utility):
+    """The weighted sum of returns."""
+
+    title: ClassVar[str] = "reward"
+
+    def __call__(self, returns: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Utility (...) of returns (..., m) at weights (..., m)."""
+        return scalarize(returns, weights)
+
+    def gain(self, before: np.ndarray, added: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """The same, whatever there was before, without the rounding of a difference."""
+        return scalarize(added, weights)
+
+
+@dataclass(frozen=True)
+class Chebyshev(Utility):
+    """Minus the largest weighted shortfall from an ideal point.
+
+    ideal : a return for each objective, fixed by the task. An objective of weight 0 does not count.
+    """
+
+    ideal: tuple[float, ...]
+    title: ClassVar[str] = "Chebyshev's utility"
+
+    def __call__(self, returns: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Utility (...) of returns (..., m) at weights (..., m)."""
+        return -np.where(weights > 0, weights * (np.array(self.ideal) - returns), -np.inf).max(-1)
+
+
+#: What --scalarization names; one of your own is made without arguments.
+SCALARIZATIONS = {"linear": Linear, "chebyshev": Chebyshev}
+LINEAR = Linear()

@@ -190,7 +190,7 @@ class Objective:
     high: float = 1.0
 
     def __post_init__(self):
-        taken = (*PAPER_OBJECTIVES, "components")
+        taken = (*PAPER_OBJECTIVES, "components", "scalarized")
         if not isinstance(self.name, str) or not self.name.isidentifier() or self.name in taken:
             raise ValueError(f"objective name {self.name!r}: an identifier is allowed, not {', '.join(taken)}")
         if not callable(self.value):

@@ -18,6 +18,7 @@ def check_weights(value, objectives: int, what: str = "preference") -> np.ndarra
     Weights are kept as given. Raises ValueError that names `what`, the value and what is allowed.
     """
     _refuse_labels(value, what)
+    value = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
     if objectives == 2 and not _is_sequence(value):
         if not _is_number(value) or not 0.0 <= value <= 1.0:
             raise ValueError(f"{what}: a number in [0, 1] is allowed, got {value!r}")
@@ -40,6 +41,7 @@ def spread_weights(value, number: int, objectives: int) -> list:
     if value is None:
         return [None] * number
     _refuse_labels(value, "preference")
+    value = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
     several = _is_sequence(value)
     for_all = not several if objectives == 2 else several and all(_is_number(weight) for weight in value)
     if for_all:
