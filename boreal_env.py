@@ -252,7 +252,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     ## Reset and Step
     `reset(seed=, options={"preference": w, "site": {name: value}})`; seeds are at most 2^63 - 1, here and everywhere.
     `info` is empty but for the last step, where it has the episode's totals (and for `record_steps`). Bad values raise
-    ValueError, a step before reset or after the end RuntimeError.
+    ValueError, a step before reset or after the end RuntimeError (of `gym.make` gymnasium's ResetNeeded).
 
     ## Attributes and Methods
     `objective_names`, `reward_dim`, `mode`, `years`, `thaw_formulation`, `site_seed` and `observation_names` are

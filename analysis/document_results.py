@@ -163,6 +163,8 @@ def rows_of(results: Results, script: str, environment: str | None = None) -> li
         (key, replicates)
         for key, replicates in results.rows_of_two_objectives().items()
         if key[0] == script and replicates and environment in (None, key[1])
+        # under the asymmetric reward, which judges all, what does not learn is the same whatever is rewarded
+        if script in methods.TRAINED or "thaw_formulation" not in key[2]
     ]
     shown_rows = []
     for (_, env_id, setting), replicates in found:

@@ -78,7 +78,8 @@ OF_RETURNS = ("Carbon return", "Thaw return", "Weighted gain")
 
 
 def reported(method):
-    """What is wrong with what was chosen is said in one line of the page; nothing else changes then."""
+    """What is wrong with what was chosen is said in one line of the page, and no year is played until it is right."""
+    chooses = method.__name__ in ("restart", "replay", "start_over")
 
     @functools.wraps(method)
     def call(self, *arguments):
@@ -88,6 +89,11 @@ def reported(method):
         except (ValueError, OSError, ImportError, sim.PhysicsError) as error:
             self.pause()
             self.say(str(error).splitlines()[0], wrong=True)
+            if chooses:  # the stands are not those that the page says
+                self.allow(False)
+        else:
+            if chooses:
+                self.allow(True)
 
     return call
 
@@ -213,6 +219,11 @@ class Page:
             self.pause()
         else:
             self.wait()
+
+    def allow(self, playing: bool) -> None:
+        """Whether years can be played, and looked at."""
+        for widget in (*(made for name, made in self.buttons.items() if name != "Start over"), self.year):
+            widget.disabled = not playing
 
     def pause(self) -> None:
         """Watch no further."""

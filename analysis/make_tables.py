@@ -59,7 +59,8 @@ TABLES = (
 
 SHOWN = 3  # commands of what is not there
 EXPLANATION = """Score: 0 is to do nothing, 100 the best constant plan of each weight. Interquartile mean over training
-seeds [95 % bootstrap interval, of score and gain over seeds and sites]. Seeds to tell 0.1: a method, of gain."""
+seeds [95 % bootstrap interval, of score and gain over seeds and sites]. Seeds to tell 0.1: how many training seeds
+each of two methods needs whose gains differ by 0.1."""
 
 
 @dataclass

@@ -171,15 +171,16 @@ class Results:
         return metrics.gains(evaluation, longest) if known else None
 
     def zero_change(self, env_id, thaw_formulation, site_seed) -> pd.DataFrame | None:
-        """The longest evaluation of zero change under these conditions, else that constant plan; None without one."""
+        """Episodes of zero change under these conditions, of all its runs and of that constant plan; None without."""
         conditions = {"env_id": env_id, "thaw_formulation": thaw_formulation, "site_seed": site_seed}
         same = [
             run.evaluation
             for run in self.runs
             if run.script == "zero_change" and all(run.arguments[name] == value for name, value in conditions.items())
         ]
-        plans = None if same else self.constant_plans_in(**conditions)
-        return max(same, key=len, default=None) if plans is None else plans[plans.action == NO_CHANGE]
+        plans = self.constant_plans_in(**conditions)
+        same += [] if plans is None else [plans[plans.action == NO_CHANGE]]
+        return pd.concat(same, ignore_index=True).drop_duplicates("seed") if same else None
 
     def constant_plans_in(self, env_id, thaw_formulation, site_seed) -> pd.DataFrame | None:
         """The study of constant plans under these conditions, with the returns of the environment's objectives."""

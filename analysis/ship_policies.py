@@ -58,6 +58,9 @@ def main(args: Args) -> None:
         saved["agent"] = kept
         if "run" not in saved:
             sys.exit(f"error: {path}: a policy file that names its run is allowed, as run.save_policy writes it")
+        script = Path("cleanrl_style", f"{saved['run']['script']}.py")
+        if not (Path(__file__).parents[1] / script).is_file():
+            sys.exit(f"error: {path}: its script has to be {script} first, or nobody who has the policy can load it")
         buffer, name = io.BytesIO(), name_of(saved["run"])
         torch.save(saved, buffer)
         if len(buffer.getvalue()) > LARGEST:

@@ -157,6 +157,8 @@ def eupg_loss(agent, x, mask, action, utility):
 if __name__ == "__main__":
     if args.scalarization == "chebyshev" and args.utility == "future":
         protocol.fail("--utility future is for --scalarization linear; for chebyshev total is allowed")
+    if args.baseline == "others" and args.num_envs == 1:
+        protocol.fail("--baseline others is the mean of a batch's other episodes: --num-envs 2 or more is allowed")
     task = protocol.make_task(args, preference=args.preference, hide_site=args.hide_site)
     episode_columns = task.episode_columns
     update_columns = (
@@ -168,8 +170,6 @@ if __name__ == "__main__":
         "utility_mean",
         "utility_std",
     )
-    if args.baseline == "others" and args.num_envs == 1:
-        protocol.fail("--baseline others is the mean of a batch's other episodes: --num-envs 1 has none")
     if task.years and args.total_timesteps < task.years * args.num_envs:
         protocol.fail(
             f"--total-timesteps {args.total_timesteps} has no room for a batch, an episode of each "

@@ -221,17 +221,21 @@ def test_my_own_hand_goes_on_from_what_was_done(page):
     assert card.stand.actions == [*before, 11]
 
 
-def test_what_is_wrong_is_said_in_one_line_and_changes_nothing(page, tmp_path):
+def test_what_is_wrong_is_said_in_one_line_and_no_year_is_played_with_it(page, tmp_path):
     card = page.cards["A"]
     page.forward(1)
     stand = card.stand
     card.policy.value = "The policy of a run's folder"
-    assert not page.message.visible and card.folder.visible
+    assert "stand A: type the folder of the run" in page.message.object and card.folder.visible
     card.folder.value = str(tmp_path / "no<where>")
     assert page.message.visible and "no&lt;where&gt;" in page.message.object
     assert card.stand is stand
+    steps = [page.buttons[name] for name in ("A year", "Ten years", "To the end", "Play")]
+    assert all(button.disabled for button in steps) and not page.buttons["Start over"].disabled
+    page.start_over()
+    assert page.message.visible and all(button.disabled for button in steps)
     card.folder.value = saved_run(tmp_path / "run")
-    assert not page.message.visible and card.stand is not stand
+    assert not page.message.visible and card.stand is not stand and not any(button.disabled for button in steps)
     page.forward(1)
     assert card.stand.played == 2
 
@@ -264,6 +268,10 @@ def test_the_page_in_a_browser(tmp_path):
         folder.fill("runs/nowhere")
         folder.press("Enter")
         tab.get_by_text("runs/nowhere").wait_for()
+        assert tab.get_by_role("button", name="Play").is_disabled()
+        folder.fill(saved_run(tmp_path / "own"))
+        folder.press("Enter")
+        tab.get_by_text("runs/nowhere").wait_for(state="hidden")
         tab.get_by_role("button", name="Play").click()
         tab.get_by_text(re.compile("After 1[23] of 50 years")).first.wait_for()
         tab.get_by_role("button", name="Pause").click()

@@ -1,5 +1,6 @@
 """One of the two stands: who manages it, its picture, its returns."""
 
+import functools
 from collections.abc import Callable
 
 import panel as pn
@@ -86,9 +87,9 @@ class StandCard:
     def take(self, changed) -> None:
         """Somebody else manages the stand, or otherwise. By hand it begins with what was done before."""
         self.show_controls()
-        waits_for_folder = self.policy.value == OTHER_RUN and not self.folder.value
-        if not self.by_hand and not waits_for_folder:
-            changed(self)
+        if not self.by_hand:
+            # after this event: the browser sends two of a text that is entered, and charts hear the later one
+            pn.state.execute(functools.partial(changed, self), schedule=True)
 
     def played(self, setting: Setting, years: int) -> tuple[Stand, Player]:
         """A new stand after so many years, managed as is chosen, or by hand as it was. Raises what `trained` does."""
@@ -112,6 +113,8 @@ class StandCard:
             return constant(self.action)
         if name == BY_HAND:
             return lambda _: self.action
+        if name == OTHER_RUN and not self.folder.value:
+            raise ValueError(f"stand {self.letter}: type the folder of the run, and Enter")
         return trained(self.folder.value if name == OTHER_RUN else name, stand, self.greedy.value)
 
     @property

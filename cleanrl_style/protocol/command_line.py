@@ -68,7 +68,7 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     watch = commands.add_parser("watch", help="fifty years of a trained policy, as an animated GIF or in a window")
     watch.add_argument("policy", help="folder of a run, policy file, or name of a policy that ships")
     watch.add_argument("--script", type=Path, help="the script that trained it, if not of cleanrl_style/")
-    watch.add_argument("--preference", type=float, nargs="+", help="carbon weight, or one weight an objective")
+    watch.add_argument("--preference", type=float, nargs="+", help="carbon weight, or one an objective (all equal)")
     watch.add_argument("--site-seed", type=int, help="the site, as sim.sample_site(seed) draws it (the seed's own)")
     watch.add_argument("--seed", type=int, default=0, help="of weather, first stand and dice (0)")
     watch.add_argument("--env-id", help="another environment than the policy was trained on")
@@ -231,7 +231,7 @@ def print_returns(env: gym.Env, objectives, seed: int, weights: np.ndarray, retu
     _, nothing = play(env, lambda *given: boreal_env.NO_CHANGE, seed, weights)
     for name, weight, one, other in zip(objectives, weights, returns, nothing, strict=True):
         print(f"{name:>12} weight {weight:.2f}: return {one:+.2f}, doing nothing {other:+.2f}, gain {one - other:+.2f}")
-    print(f"{'scalarised':>12} gain {weights @ (returns - nothing):+.2f}")
+    print(f"{'weighted':>12} gain {weights @ (returns - nothing):+.2f}")
 
 
 def name_of_animation(args: argparse.Namespace, policy: Policy, env_id: str, weights: np.ndarray) -> str:
