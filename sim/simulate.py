@@ -136,7 +136,7 @@ def simulate(
     per_year = np.full(years, given) if given.ndim == 0 else given
     check_actions(per_year, years, "years")
     given_site = check_mapping("site parameters", site)
-    if boundary is None:  # that of the middle site lies below no record's climate
+    if boundary is None:  # the middle of what is sampled would be in balance with a record's climate by chance alone
         boundary = "balanced" if forcing is not None and BOUNDARY not in given_site else "sampled"
     overrides, boundary = _with_boundary(given_site, boundary)
     for name, value in overrides.items():

@@ -13,6 +13,7 @@ from scripts import ROOT, run_script
 from cleanrl_style import protocol
 from cleanrl_style.flags import policy_file
 from cleanrl_style.ppo_group import Agent
+from cleanrl_style.protocol.agents import own_script
 
 TOY = "toy_env:toy-v0"
 SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
@@ -33,6 +34,7 @@ def evaluate_again(folder, policy):
 def test_a_loaded_agent_plays_the_evaluation_again(script, tmp_path):
     train(f"cleanrl_style/{script}.py", tmp_path)
     evaluate_again(tmp_path, protocol.load_policy(tmp_path))
+    assert own_script(tmp_path) is None  # it is imported, not read a second time
 
 
 def test_the_agent_of_a_script_elsewhere(tmp_path):

@@ -47,7 +47,7 @@ def draw(figure, results) -> None:
         edges = np.linspace(0, 1, BINS + 1)
         middles = stands.conifer_fraction + edges[1] / 2
         number = {"weights": stands.episodes, "density": True}
-        if not stands.episodes.any():
+        if not stands.episodes.any():  # nothing has no density
             continue
         training.hist(middles, edges, **number, histtype="step", color=method.colour)
     finish(training, xlabel="conifer fraction after 50 years", ylabel="density of episodes")

@@ -164,8 +164,10 @@ def own_script(folder: Path) -> Path | None:
         named = json.loads((folder / "config.json").read_text(encoding="utf-8")).get("file")
     except (OSError, ValueError, AttributeError):
         return None
-    path = Path(__file__).parents[2] / named if isinstance(named, str) else None  # an absolute one stays what it is
-    return path if path is not None and path.is_file() else None
+    if not isinstance(named, str):
+        return None
+    path = Path(__file__).parents[2] / named  # an absolute one stays what it is
+    return path if path.is_file() and path.parent != Path(__file__).parents[1] else None  # those there are imported
 
 
 def _load_again(name: str, file: str, script: str | None) -> Policy:

@@ -379,9 +379,8 @@ class Run:
             own = "run.save_policy(agent, name=value, ..) wants every argument that the Agent was made with after envs"
             raise TypeError(f"{own}, not {arguments}: they make another network") from error
         own = {name: value for name, value in self.config["arguments"].items() if name != "vectorization"}
-        run = json.loads(
-            json.dumps({"script": self.script, "arguments": own}, default=str)
-        )  # the same bytes, async or lockstep
+        # without the vectorization: the same bytes, async or lockstep
+        run = json.loads(json.dumps({"script": self.script, "arguments": own}, default=str))
         policy = {"agent": agent.state_dict(), "arguments": arguments, "observation_shape": shape, "run": run}
         torch.save(policy, buffer)
         try:

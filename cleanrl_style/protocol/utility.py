@@ -1,5 +1,6 @@
 """What returns are worth at a preference: the utility that a training maximises and its evaluation reports."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -8,7 +9,7 @@ import numpy as np
 from cleanrl_style.protocol.fronts import scalarize
 
 
-class Utility:
+class Utility(ABC):
     """The utility of an episode's return; another one is a class with its own `__call__` in `SCALARIZATIONS`.
 
     What is not linear is the utility of each episode's own return (expected scalarised return, ESR), and means are over
@@ -17,9 +18,9 @@ class Utility:
 
     title: ClassVar[str] = "utility"  # as a run prints it
 
+    @abstractmethod
     def __call__(self, returns: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Utility (...) of returns (..., m) at weights (..., m)."""
-        raise NotImplementedError
 
     def gain(self, before: np.ndarray, added: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """What `added` (..., m) is worth to who has `before` (..., m).
