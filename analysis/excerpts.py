@@ -85,36 +85,36 @@ def shares() -> str:
 
 
 def scaling() -> str:
-    """How speed grows with stands and cores, and what a region costs; results/scaling.csv has it."""
-    path = paths.results() / "scaling.csv"
-    if not path.exists():
-        return "Not measured yet.\n"
-    table = pd.read_csv(path)
-    years = table[table.what == "a year"]
-    header, columns = ["stands"], []
-    for (backend, threads), group in years.groupby(["backend", "threads"], sort=False):
-        cores = "GPU" if backend == "cuda" else "1 core" if threads == 1 else f"{threads} cores"
-        header += [f"{cores}: stand-years/s", "of its best"] + (["of a core's alone"] if threads > 1 else [])
-        columns.append(group.set_index("stands"))
-    rows = []
-    for stands in dict.fromkeys(years.stands):
-        cells = [f"{stands:,}"]
-        for column, group in zip(columns, years.groupby(["backend", "threads"], sort=False).groups, strict=True):
-            row = column.loc[stands]
-            cells += [f"{row['median']:,.0f}", f"{row['median'] / column['median'].max():.0%}"]
-            cells += [f"{row.efficiency:.0%}"] if group[1] > 1 else []
-        rows.append(cells)
-    text = markdown(header, rows)
-    region = table[table.what.str.contains("stands, ")]
-    costs = {}
+    """How speed grows with stands and cores, and what a region costs: of each machine that was measured."""
+    return "\n".join(of_machine(pd.read_csv(path)) for path in sorted(paths.results().glob("scaling*.csv")))
+
+
+def of_machine(table: pd.DataFrame) -> str:
+    """Its speeds, a row a number of stands, then its environment and its costs."""
+    years = table[table.what.str.startswith("a year")]
+    columns = {}
+    for (backend, what, threads), group in years.groupby(["backend", "what", "threads"], sort=False):
+        name = "the GPU" if backend == "cuda" else "1 core" if threads == 1 else f"{threads} cores"
+        column = group.set_index("stands")
+        cells = column["median"].map("{:,.0f}".format)
+        if threads > 1:
+            cells += " (" + column.efficiency.map("{:.0%}".format) + ")"
+        columns[name + what.removeprefix("a year")] = cells
+    shown = pd.DataFrame(columns).fillna("")
+    lines = []
+    steps, region = table[table.what == "an environment's step"], table[table.what.str.contains("stands, ")]
+    for _, row in steps.iterrows():
+        on = "the GPU" if row.backend == "cuda" else f"{row.threads} cores"
+        lines.append(f"- `BorealVectorEnv` of {row.stands:,} stands on {on}: {row['median']:,.0f} steps a second.")
     for backend, group in region.groupby("backend", sort=False):
         hours, dollars = (row for _, row in group.iterrows())
-        shown = (f"{row['median']:,.3g} {row.unit} ({row.low:,.3g} to {row.high:,.3g})" for row in (hours, dollars))
-        price = dollars["median"] / hours["median"]
-        costs[backend] = f"{', '.join(shown)}, at {price:.4g} dollars a {hours.unit.replace('-hours', '-hour')}"
-    what = region.what.iloc[0].replace("1000000 stands,", "A million stands for")
-    lines = (f"- {what}, {'on GPUs' if name == 'cuda' else 'on cores'}: {cost}." for name, cost in costs.items())
-    return text + "\n" + "\n".join(lines) + f"\n\nMeasured on {table.machine.iloc[0]}.\n"
+        costs = [f"{row['median']:,.3g} {row.unit} ({row.low:,.3g} to {row.high:,.3g})" for row in (hours, dollars)]
+        price = f"{dollars['median'] / hours['median']:.4g} dollars a {hours.unit.replace('-hours', '-hour')}"
+        what = hours.what.replace("1000000 stands,", "A million stands for")
+        lines.append(f"- {what}, {'on GPUs' if backend == 'cuda' else 'on cores'}: {', '.join(costs)}, at {price}.")
+    rows = [[f"{stands:,}", *cells] for stands, cells in zip(shown.index, shown.to_numpy(), strict=True)]
+    names = " and ".join(dict.fromkeys(table.machine))
+    return f"{names}:\n\n" + markdown(["stands", *shown.columns], rows) + "\n" + "\n".join(lines) + "\n"
 
 
 def region_killed() -> str:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numba.cuda
 import numpy as np
 import pandas as pd
 
@@ -38,10 +39,14 @@ class Args:
 
     stands: tuple[int, ...] = (16, 64, 256, 1024, 4096, 16384, 65536)
     """numbers of stands"""
+    gpu_stands: tuple[int, ...] = (1024, 4096, 16384, 32768, 65536)
+    """numbers of stands on a GPU"""
     threads: tuple[int, ...] = ()
     """numbers of threads (1, 2, 4, 8 and so on, and as many as there are cores)"""
     environments: int = 4096
     """stands of the environment that is stepped"""
+    gpu_environments: int = 16384
+    """the same on a GPU"""
     repeats: int = 3
     """repeats of every figure"""
     dollars_per_core_hour: float = 0.0425
@@ -49,7 +54,7 @@ class Args:
     dollars_per_gpu_hour: float = 4.92
     """price of an H100: of an EC2 Capacity Block of p5.48xlarge (Amazon EC2 Capacity Blocks, pricing of 2024)"""
     quick: bool = False
-    """16 and 64 stands, an environment of 64, one repeat"""
+    """16 and 64 stands, an environment of 64, one repeat; of 1024 on a GPU"""
     output_dir: Path = Path("results")
     """folder for scaling.csv"""
 
@@ -83,6 +88,15 @@ def year(stands: sim.Stands) -> float:
     return stands.number / (time.perf_counter() - start)
 
 
+def physics(stands: sim.Stands) -> float:
+    """Stand-years a second of a year whose random numbers are drawn already."""
+    which = np.arange(stands.number)
+    draws = stands._draw(which)
+    start = time.perf_counter()
+    stands._run(which, draws, np.full(stands.number, boreal_env.NO_CHANGE))
+    return stands.number / (time.perf_counter() - start)
+
+
 def environment_step(env: boreal_env.BorealVectorEnv) -> float:
     """Steps a second of a vector environment, observations and rewards included."""
     start = time.perf_counter()
@@ -92,11 +106,14 @@ def environment_step(env: boreal_env.BorealVectorEnv) -> float:
 
 def measurements(args: Args) -> Iterator[tuple[tuple, list[float]]]:
     """(backend, what, threads, stands, unit) and its repeats; the first call of each compiles, and is dropped."""
+    unit = "stand-years per s"
+    cores = tuple(sorted({2**k for k in range(available_cores().bit_length())} | {available_cores()}))
+    on_cores = args.threads or cores, args.stands, args.environments
+    plans = {"numba": on_cores, "cuda": ((1,), args.gpu_stands, args.gpu_environments)}
     first = started(min(SITES, max(args.stands)))
-    threads = args.threads or tuple(sorted({2**k for k in range(available_cores().bit_length())} | {available_cores()}))
     for backend in backends():
-        counts = threads if backend == "numba" else (1,)
-        for number in args.stands:
+        counts, numbers, environments = plans[backend]
+        for number in numbers:
             groups = {count: repeated(first, number, backend=backend, threads=count) for count in counts}
             rates: dict[int, list[float]] = {count: [] for count in counts}
             for _ in range(args.repeats + 1):
@@ -104,11 +121,16 @@ def measurements(args: Args) -> Iterator[tuple[tuple, list[float]]]:
                     rates[count].append(year(stands))
             print(f"{number:,} stands: {max(map(max, rates.values())):,.0f} stand-years a second", file=sys.stderr)
             for count in counts:
-                yield (backend, "a year", count, number, "stand-years per s"), rates[count][1:]
-        env = boreal_env.BorealVectorEnv(args.environments, threads=max(counts), backend=backend, years=1000)
+                yield (backend, "a year", count, number, unit), rates[count][1:]
+            if backend == "cuda":
+                yield (
+                    (backend, "a year, drawn before", 1, number, unit),
+                    [physics(groups[1]) for _ in range(args.repeats)],
+                )
+        env = boreal_env.BorealVectorEnv(environments, threads=max(counts), backend=backend, years=1000)
         env.reset(seed=0)
         steps = [environment_step(env) for _ in range(args.repeats + 1)][1:]
-        yield (backend, "an environment's step", max(counts), args.environments, "stand-years per s"), steps
+        yield (backend, "an environment's step", max(counts), environments, unit), steps
 
 
 def region(table: pd.DataFrame, args: Args) -> pd.DataFrame:
@@ -131,14 +153,16 @@ def region(table: pd.DataFrame, args: Args) -> pd.DataFrame:
 def run(args: Args) -> pd.DataFrame:
     """All figures, a row each, columns `COLUMNS`."""
     facts = machine()
-    name = f"{facts['processor']}, {facts['cores']} cores"
     rows = [(*key, statistics.median(rates), min(rates), max(rates), len(rates)) for key, rates in measurements(args)]
     table = pd.DataFrame(rows, columns=[*COLUMNS[:8], "repeats"])
     alone = table[(table.threads == 1) & (table.backend == "numba")].set_index(["what", "stands"])["median"]
     base = [alone.get(key, np.nan) for key in zip(table.what, table.stands, strict=True)]
     table["efficiency"] = np.where(table.backend == "numba", table["median"] / (table.threads * np.array(base)), np.nan)
     both = pd.concat([table, region(table, args)], ignore_index=True)
-    both["machine"], both["repeats"] = name, both.repeats.astype("Int64")
+    names = {"numba": f"{facts['processor']}, {facts['cores']} cores"}
+    if "cuda" in set(table.backend):
+        names["cuda"] = numba.cuda.get_current_device().name
+    both["machine"], both["repeats"] = both.backend.map(names), both.repeats.astype("Int64")
     return both[list(COLUMNS)]
 
 
@@ -150,6 +174,7 @@ def main(args: Args) -> None:
         )
     if args.quick:
         args.stands, args.environments, args.repeats = (16, 64), 64, 1
+        args.gpu_stands, args.gpu_environments = (1024,), 1024
     make_writable("--output-dir", args.output_dir)
     table = run(args)
     with protocol.replacing(args.output_dir / "scaling.csv") as file:
