@@ -23,9 +23,9 @@ if not Path(__file__).with_name("sim").samefile(_found := getattr(sim, "__path__
     raise ImportError(f"boreal_env needs the package `sim` beside it, but Python found {_found} first: rename that")
 
 from sim.block import kernel, lanes_for
-from sim.draws import restored_generator
 from sim.management import NUM_ACTIONS, as_array
 from sim.parameters import brief, check_name, check_overrides, check_seed
+from sim.saved import restored_generator
 from sim.stands import check_threads, positive_integer
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions, where_valid
 from sim.task.episodes import (
@@ -211,8 +211,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `mode`: "generalist" or "site-specific"
     - `years`: length of an episode (50)
     - `time_step_minutes`: a divisor of 1440, at most 120 (30)
-    - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (for thousands of stands; not yet run on
-      a GPU, only in numba's simulator of one)
+    - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (a GPU, for thousands)
     - `thaw_formulation`: "asymmetric", "contrast" or "raw_degree_days"
     - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one, or the weights of all objectives
     - `site_seed`: one site (`sim.sample_site(site_seed)`) instead of a new one each episode

@@ -33,7 +33,6 @@ from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 from cleanrl_style.protocol.hosts import split
 from sim.block import KERNELS
-from sim.draws import draw_year
 from sim.stands import available_cores
 from sim.state import DAYS
 
@@ -174,8 +173,7 @@ def threads(args: Args, stack: ExitStack) -> list[Measurement]:
 
 def physics_alone(groups: list[sim.Stands], pool: ThreadPoolExecutor) -> float:
     """Time of a year of the physics and nothing else [s]: a call for each group of stands, on all cores."""
-    generator = np.random.default_rng(0)
-    draws = [np.array([draw_year(generator, generator) for _ in range(group.number)]) for group in groups]
+    draws = [group._draw(np.arange(group.number)) for group in groups]
 
     def year(group, draw):
         group._run(np.arange(group.number), draw, np.full(group.number, boreal_env.NO_CHANGE))

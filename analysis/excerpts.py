@@ -97,7 +97,7 @@ def of_machine(table: pd.DataFrame) -> str:
         name = "the GPU" if backend == "cuda" else "1 core" if threads == 1 else f"{threads} cores"
         column = group.set_index("stands")
         cells = column["median"].map("{:,.0f}".format)
-        if threads > 1:
+        if backend == "numba" and threads > 1:
             cells += " (" + column.efficiency.map("{:.0%}".format) + ")"
         columns[name + what.removeprefix("a year")] = cells
     shown = pd.DataFrame(columns).fillna("")

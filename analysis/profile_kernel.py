@@ -27,7 +27,6 @@ from sim.account import clear_day, end_day
 from sim.block import LANES, filled_block
 from sim.canopy import solve_canopy
 from sim.day import begin_day
-from sim.draws import draw_year
 from sim.forcing import hour_angles, step_weather
 from sim.jit import OPTIONS, loops_kept
 from sim.physical_constants import SECONDS_PER_DAY
@@ -110,13 +109,11 @@ def nothing(lanes: int) -> tuple[np.ndarray, np.ndarray]:
 def blocks_at(moments: dict, lanes: int) -> dict[str, tuple]:
     """Sampled stands at the start of a step: name of the moment -> (block, day, t, hours)."""
     stands = started(lanes, threads=1)
-    generator = np.random.default_rng(0)
-    draws = np.array([draw_year(generator, generator) for _ in range(lanes)])
     blocks, _ = filled_block(
         lanes,
         stands.parameters,
         stands.state,
-        draws,
+        stands._draw(np.arange(lanes)),
         np.full(lanes, NO_CHANGE),
         first_cut_age=stands.first_cut_age,
         products_decay=stands.products_decay,

@@ -24,6 +24,7 @@ from analysis.benchmark import started
 from analysis.machine import machine
 from analysis.paths import make_writable
 from cleanrl_style import protocol
+from sim.draws import streams_of
 from sim.spin_up import SPIN_UP_STEPS_PER_DAY, SPIN_UP_YEARS
 from sim.stands import available_cores
 
@@ -66,7 +67,7 @@ def repeated(first: sim.Stands, number: int, **kwargs) -> sim.Stands:
     stands = sim.Stands(number, **kwargs)
     saved = first.get_state().items()
     state = {k: v[which] if isinstance(v, np.ndarray) else [v[i] for i in which] for k, v in saved}
-    state["weather"] = [np.random.default_rng(k).bit_generator.state for k in range(number)]
+    state["streams"] = np.array([streams_of(sim.episode_seeds(k)) for k in range(number)])
     stands.set_state(state)
     return stands
 
@@ -109,7 +110,7 @@ def measurements(args: Args) -> Iterator[tuple[tuple, list[float]]]:
     unit = "stand-years per s"
     cores = tuple(sorted({2**k for k in range(available_cores().bit_length())} | {available_cores()}))
     on_cores = args.threads or cores, args.stands, args.environments
-    plans = {"numba": on_cores, "cuda": ((1,), args.gpu_stands, args.gpu_environments)}
+    plans = {"numba": on_cores, "cuda": ((available_cores(),), args.gpu_stands, args.gpu_environments)}
     first = started(min(SITES, max(args.stands)))
     for backend in backends():
         counts, numbers, environments = plans[backend]
@@ -123,10 +124,8 @@ def measurements(args: Args) -> Iterator[tuple[tuple, list[float]]]:
             for count in counts:
                 yield (backend, "a year", count, number, unit), rates[count][1:]
             if backend == "cuda":
-                yield (
-                    (backend, "a year, drawn before", 1, number, unit),
-                    [physics(groups[1]) for _ in range(args.repeats)],
-                )
+                alone = [physics(stands) for _ in range(args.repeats) for stands in groups.values()]
+                yield (backend, "a year, drawn before", *counts, number, unit), alone
         env = boreal_env.BorealVectorEnv(environments, threads=max(counts), backend=backend, years=1000)
         env.reset(seed=0)
         steps = [environment_step(env) for _ in range(args.repeats + 1)][1:]
@@ -140,7 +139,7 @@ def region(table: pd.DataFrame, args: Args) -> pd.DataFrame:
     prices = {"numba": args.dollars_per_core_hour, "cuda": args.dollars_per_gpu_hour}
     for backend, of_backend in table[table.what == "a year"].groupby("backend", sort=False):
         best = of_backend.loc[of_backend["median"].idxmax()]
-        units = best.threads
+        units = best.threads if backend == "numba" else 1
         speeds = best[["median", "high", "low"]]
         hours = [REGION_STANDS * (REGION_YEARS + spin_up) * units / speed / 3600.0 for speed in speeds]
         what = f"{REGION_STANDS} stands, {REGION_YEARS} years"

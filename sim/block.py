@@ -6,12 +6,11 @@ Stands are rows of arrays, (stands, fields); a block has them as lanes of `sim.s
 import functools
 import logging
 import math
-import threading
 from types import SimpleNamespace
 
 import numpy as np
 
-from sim.jit import alone, cache_folder, is_cacheable, loops_kept, specialised, uncompiled, warn_uncached
+from sim.jit import MAKING, alone, cache_folder, is_cacheable, loops_kept, made_ready, specialised, uncompiled
 from sim.management import decode
 from sim.state import DAILY, DRAWS_SIZE, RECORD, STATE_SIZE, block_dtype, daily_dtype
 from sim.year import simulate_year
@@ -121,7 +120,7 @@ def kernel(lanes: int):
 
     Of several processes that want it one compiles it, and says so through the logger `sim.block`; the others wait.
     """
-    with _MAKING:
+    with MAKING:
         if lanes not in _MADE:
             with alone(f"{lanes}_lanes"):
                 if not is_compiled(lanes):
@@ -135,12 +134,7 @@ def _made(lanes: int):
     made = specialised(simulate_year, f"{lanes}_lanes")
     nothing = np.zeros(1, block_dtype(lanes)), 1, 0, np.zeros((0, 6, lanes)), np.zeros(0, daily_dtype(lanes))
     with loops_kept():
-        try:
-            made(*nothing)
-        except OSError as error:  # a full disk: it is compiled, but not kept
-            warn_uncached(error)
-            made(*nothing)
-    return made
+        return made_ready(made, *nothing)
 
 
 def is_compiled(lanes: int) -> bool:
@@ -151,7 +145,6 @@ def is_compiled(lanes: int) -> bool:
 
 _LOGGER = logging.getLogger("sim.block")
 _MADE: dict = {}  # kernels by lanes
-_MAKING = threading.Lock()  # threads may come together, and numba's cache folder is one setting for all of them
 
 
 @functools.cache

@@ -17,6 +17,7 @@ import hashlib
 import os
 import sys
 import tempfile
+import threading
 import types
 import warnings
 from pathlib import Path
@@ -45,6 +46,8 @@ if (
     and llvm.get_host_cpu_name() not in SLOWED
 ):
     FEATURES = numba.config.CPU_FEATURES = f"{FEATURES},-prefer-256-bit"
+
+MAKING = threading.Lock()  # threads may come together, and numba's cache folder is one setting for all of them
 
 compiled = numba.njit(**OPTIONS, forceinline=True)
 phase = numba.njit(**OPTIONS)
@@ -112,6 +115,16 @@ def specialised(dispatcher: Dispatcher, name: str):
         return numba.njit(**OPTIONS, cache=is_cacheable())(copy.py_func)
     finally:
         numba.config.CACHE_DIR = previous
+
+
+def made_ready(made, *nothing):
+    """A function of `specialised`, compiled or loaded for arguments like these."""
+    try:
+        made(*nothing)
+    except OSError as error:  # a full disk: it is compiled, but not kept
+        warn_uncached(error)
+        made(*nothing)
+    return made
 
 
 @contextlib.contextmanager

@@ -40,3 +40,15 @@ def check_array(what: str, saved, ours: np.ndarray, low: float = -np.inf, high: 
     if wrong.size:
         allowed = "finite numbers are" if np.isinf(low) else f"[{low:g}, {high:g}] is"
         raise ValueError(f"{what}: {allowed} allowed, got {wrong[0]}")
+
+
+def restored_generator(state):
+    """A generator in the given state of its bit generator; None for None."""
+    if state is None:
+        return None
+    generator = np.random.default_rng(0)
+    try:
+        generator.bit_generator.state = state
+    except (TypeError, ValueError, KeyError, OverflowError):
+        raise ValueError(f"state of a generator: that of a PCG64 is allowed, got {brief(state)}") from None
+    return generator

@@ -19,7 +19,7 @@ from sim.block import BACKENDS, blocks, lanes_for, run_block
 from sim.closure import check_closure
 from sim.deadwood import deadwood_in_balance
 from sim.demography import AGES, first_ages
-from sim.draws import Seeds, draw_slice, draw_year, restored_generator
+from sim.draws import STREAMS, WORDS, Seeds, draw_slice, drawer, streams_of
 from sim.management import NO_CHANGE, check_actions, first_cut_age
 from sim.parameters import (
     SITE_PARAMETERS,
@@ -63,8 +63,9 @@ from sim.state import (
     STATE_SIZE,
 )
 
-ARRAYS = ("parameters", "state", "record", "years")  # of what a state saves
-SAVED = (*ARRAYS, "seeds", "weather", "disturbance")  # that the future depends on
+ARRAYS = ("parameters", "state", "record", "years", "streams")  # of what a state saves
+SAVED = (*ARRAYS, "seeds")  # that the future depends on
+DRAWN_AT_ONCE = 1024  # stands whose numbers a thread draws, where a GPU simulates them
 LONGEST_STEP_MINUTES = 120  # beyond, the air is up to 2 K too warm
 MOST_THREADS = 10_000  # so that a mistake of a thousandfold is named
 MOST_STANDS = 10_000_000  # of 5 kB each
@@ -149,8 +150,7 @@ class Stands:
         self.record = np.zeros((self.number, len(RECORD)))
         self.seeds: list[Seeds | None] = [None] * self.number
         self.years = np.zeros(self.number, dtype=int)
-        self._weather: list = [None] * self.number
-        self._disturbance: list = [None] * self.number
+        self.streams = np.zeros((self.number, len(STREAMS), WORDS), dtype=np.uint64)
 
     def start(self, stands, sites, seeds, initial=None, initial_ranges=None, observed=None) -> None:
         """Put stands at the beginning of an episode: draw their first state and spin it up.
@@ -175,8 +175,7 @@ class Stands:
         for k, stand in enumerate(stands):
             self.seeds[stand] = seeds[k]
             self.years[stand] = 0
-            self._weather[stand] = np.random.default_rng(seeds[k].weather)
-            self._disturbance[stand] = np.random.default_rng(seeds[k].disturbance)
+            self.streams[stand] = streams_of(seeds[k])
         # of stands that begin alike, the first is spun up, for all of them
         first: dict[tuple, int] = {}
         alike = [
@@ -266,16 +265,14 @@ class Stands:
             check_observed(observed, days * self.steps_per_day)
         parameters = self.parameters_of_year(stands)
         for stand in stands:
-            if self._weather[stand] is None:
+            if self.seeds[stand] is None:
                 raise RuntimeError(f"stand {stand} has not been started")
         once, alike = self._alike(stands, actions, parameters)
         rows = np.empty((len(once), days, len(DAILY))) if daily else None
         state, record = self._run(stands[once], None, actions[once], observed, days, rows, parameters=parameters[once])
         self._check(stands[once], parameters[once], state, record, "year")
         if len(once) < len(stands):
-            for stand, its_like in zip(stands, stands[once[alike]], strict=True):
-                for streams in (self._weather, self._disturbance):
-                    streams[stand].bit_generator.state = streams[its_like].bit_generator.state
+            self.streams[stands] = self.streams[stands[once[alike]]]
             state, record, rows = state[alike], record[alike], None if rows is None else rows[alike]
         self.state[stands] = state
         self.record[stands] = record
@@ -300,8 +297,8 @@ class Stands:
     def _state_of(self, stand) -> bytes:
         return self.state[stand].tobytes()
 
-    def _streams_of(self, stand) -> str:
-        return repr([of_all[stand].bit_generator.state for of_all in (self._weather, self._disturbance)])
+    def _streams_of(self, stand) -> bytes:
+        return self.streams[stand].tobytes()
 
     def parameters_of_year(self, stands) -> np.ndarray:
         """`parameters` of stands (stands, fields), with what a scenario makes of the year to come."""
@@ -337,8 +334,6 @@ class Stands:
         return {
             **{name: getattr(self, name).copy() for name in ARRAYS},
             "seeds": list(self.seeds),
-            "weather": [g and g.bit_generator.state for g in self._weather],
-            "disturbance": [g and g.bit_generator.state for g in self._disturbance],
         }
 
     def set_state(self, state: dict) -> None:
@@ -351,23 +346,23 @@ class Stands:
         if np.shape(state["years"]) != self.years.shape:
             raise ValueError(f"state of {np.size(state['years'])} stands given to {self.number}")
         for name in ARRAYS:
-            low, high = (0, 1000) if name == "years" else (-np.inf, np.inf)
+            low, high = (0, 1000) if name == "years" else (-np.inf, np.inf)  # any bits are a stream's
             check_array(f"{what}: {name}", state[name], getattr(self, name), low, high)
-        for name in ("seeds", "weather", "disturbance"):
-            if not isinstance(state[name], list) or len(state[name]) != self.number:
-                raise ValueError(f"{what}: {name}: a list of {self.number} is allowed, got {brief(state[name])}")
-        for seeds, row in zip(state["seeds"], state["parameters"], strict=True):
+        if not isinstance(state["seeds"], list) or len(state["seeds"]) != self.number:
+            raise ValueError(f"{what}: seeds: a list of {self.number} is allowed, got {brief(state['seeds'])}")
+        for seeds, row, streams in zip(state["seeds"], state["parameters"], state["streams"], strict=True):
             if seeds is None:  # not started yet
                 continue
             if not isinstance(seeds, Seeds):
                 raise ValueError(f"{what}: seeds: sim.Seeds are allowed, got {brief(seeds)}")
+            if not all(streams[:, -1] & np.uint64(1)):
+                raise ValueError(f"{what}: streams: a PCG64's increment is odd, got {streams[:, -1].tolist()}")
             values = dict(zip(PARAMETER_NAMES, row.tolist(), strict=True))
             check_overrides({name: values[name] for name in SITE_PARAMETERS})
             check_constants({name: values[name] for name in self.constants})
-        weather, disturbance = ([restored_generator(g) for g in state[name]] for name in ("weather", "disturbance"))
         for name in ARRAYS:
             setattr(self, name, state[name].copy())
-        self.seeds, self._weather, self._disturbance = list(state["seeds"]), weather, disturbance
+        self.seeds = list(state["seeds"])
 
     def settings(self) -> dict:
         """The arguments, as plain values, by which an environment tells whether a state is its own."""
@@ -415,9 +410,7 @@ class Stands:
             for chunk in chunks:
                 run(chunk)
         else:
-            if self._pool is None:
-                self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="stands")
-            list(self._pool.map(run, chunks))
+            list(self._threads().map(run, chunks))
         return state, record
 
     def _indices(self, stands) -> np.ndarray:
@@ -437,7 +430,21 @@ class Stands:
 
     def _draw(self, stands) -> np.ndarray:
         """The random numbers of the stands' next year, (stands, fields)."""
-        return np.array([draw_year(self._weather[stand], self._disturbance[stand]) for stand in stands])
+        streams, draws = self.streams[stands], np.empty((len(stands), DRAWS_SIZE))
+        draw = drawer(self.backend)
+        parts = blocks(len(stands), DRAWN_AT_ONCE)
+        if len(parts) == 1:
+            draw(streams, draws)
+        else:
+            list(self._threads().map(lambda part: draw(streams[part], draws[part]), parts))
+        self.streams[stands] = streams
+        return draws
+
+    def _threads(self) -> ThreadPoolExecutor:
+        """The threads, which wait where there is nothing to do."""
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="stands")
+        return self._pool
 
     def _check(self, stands, parameters, state, record, what) -> None:
         def describe(k):

@@ -1,0 +1,69 @@
+"""A year's random numbers are those of numpy's generators, bit for bit."""
+
+import numpy as np
+import pytest
+
+import sim
+from sim import draws, stands
+from sim.state import DAYS, DRAWS, DRAWS_SIZE
+
+NUMBER = 300  # of whose half a million normal and exponential numbers some hundred are from beyond the ziggurats
+
+
+def streams(number):
+    return np.array([draws.streams_of(sim.episode_seeds(k)) for k in range(number)])
+
+
+def of_numpy(weather, disturbance):
+    """A year's numbers as numpy's generators draw them, in the order of `DRAWS`."""
+    wind = np.random.Generator(np.random.PCG64())
+    wind.bit_generator.state = weather.bit_generator.state
+    wind.bit_generator.advance(draws.AHEAD)
+    generators = {"weather": weather, "wind": wind, "disturbance": disturbance}
+    values = []
+    for daily, distribution, stream in DRAWS.values():
+        draw = {"normal": "standard_normal", "exponential": "standard_exponential", "uniform": "random"}[distribution]
+        values.append(getattr(generators[stream], draw)(DAYS if daily else 1))
+    return np.concatenate(values)
+
+
+def test_they_are_numpys_year_after_year():
+    seeds = [sim.episode_seeds(k) for k in range(NUMBER)]
+    generators = [(np.random.default_rng(s.weather), np.random.default_rng(s.disturbance)) for s in seeds]
+    ours, drawn = streams(NUMBER), np.empty((NUMBER, DRAWS_SIZE))
+    for _ in range(2):
+        draws.drawer("numba")(ours, drawn)
+        np.testing.assert_array_equal(drawn, [of_numpy(*each) for each in generators])
+    normal, exponential = (drawn[:, draws.draw_slice(name)] for name in ("temperature_noise", "wet_amount"))
+    assert abs(normal).max() > draws.NORMAL_TAIL and exponential.max() > draws.EXPONENTIAL_TAIL
+
+
+def test_interpreted_they_are_the_same():
+    results = []
+    for backend in ("numba", "python"):
+        ours, drawn = streams(2), np.empty((2, DRAWS_SIZE))
+        draws.drawer(backend)(ours, drawn)
+        results.append((ours, drawn))
+    for compiled, interpreted in zip(*results, strict=True):
+        np.testing.assert_array_equal(compiled, interpreted)
+
+
+def test_threads_draw_what_one_does(monkeypatch):
+    results = []
+    for at_once in (5, 2):
+        monkeypatch.setattr(stands, "DRAWN_AT_ONCE", at_once)
+        five = sim.Stands(5, threads=2)
+        five.streams[:] = streams(5)
+        results.append((five._draw(np.arange(5)), five.streams))
+    for alone, together in zip(*results, strict=True):
+        np.testing.assert_array_equal(alone, together)
+
+
+def test_a_stream_that_is_none_is_refused():
+    one = sim.Stands(1, time_step_minutes=120)
+    state = one.get_state() | {"seeds": [sim.episode_seeds(0)], "streams": streams(1) - np.uint64(1)}
+    state["parameters"] = np.array(
+        [[{**sim.sample_site(0), **one.constants}.get(name, 0.0) for name in stands.PARAMETER_NAMES]]
+    )
+    with pytest.raises(ValueError, match="streams: a PCG64's increment is odd"):
+        one.set_state(state)
