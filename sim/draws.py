@@ -1,9 +1,9 @@
 """All the random numbers of a year, drawn before it begins: always as many, whatever the stand does.
 
 A stand has two streams of numpy's PCG64 (O'Neill 2014), and its numbers are those of `numpy.random.Generator`, bit for
-bit. They are drawn here in compiled code because Python's threads wait for each other in numpy's: on sixteen cores that
-took a quarter of the time. Normal and exponential numbers are by numpy's ziggurats (Marsaglia and Tsang 2000), whose
-tables numba has.
+bit. They are drawn here, in compiled code, because in numpy's Python's threads would wait for each other
+(docs/performance.md). Normal and exponential numbers are by ziggurats (Marsaglia and Tsang 2000), whose tables numba has
+from numpy; they are no public part of numba, and tests/test_draws.py tells if they ever change.
 """
 
 import functools
