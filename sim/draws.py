@@ -1,12 +1,14 @@
 """All the random numbers of a year, drawn before it begins: always as many, whatever the stand does.
 
 A stand has two streams of numpy's PCG64 (O'Neill 2014), and its numbers are those of `numpy.random.Generator`, bit for
-bit. They are drawn here, in compiled code, because in numpy's Python's threads would wait for each other
-(docs/performance.md). Normal and exponential numbers are by ziggurats (Marsaglia and Tsang 2000), whose tables numba has
-from numpy; they are no public part of numba, and tests/test_draws.py tells if they ever change.
+bit on x86-64; elsewhere numpy's own compiler may round the rarest otherwise. They are drawn here, in compiled code,
+because threads that call numpy's generators wait for each other for Python's lock (docs/performance.md). Normal and
+exponential numbers are by ziggurats (Marsaglia and Tsang 2000), whose tables numba has from numpy; they are no public
+part of numba, and tests/test_draws.py tells if they ever change.
 """
 
 import functools
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +33,7 @@ def episode_seeds(seed: int) -> Seeds:
     return Seeds(*(int(s) for s in np.random.SeedSequence(seed).generate_state(3, np.uint64) >> np.uint64(1)))
 
 
+MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645  # of PCG64
 #: Streams of a stand, in the order of `streams_of`.
 STREAMS = ("weather", "disturbance")
 WORDS = 4  # of a stream, 64 bits each: the high and the low word of the state, those of the increment
@@ -58,7 +61,6 @@ def jump(steps: int) -> tuple[int, int]:
     return a, b
 
 
-MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645  # of PCG64
 #: How far ahead of the weather's stream the wind's is: (golden ratio - 1) 2^128 draws, as PCG64's own `jumped`.
 AHEAD = 0x9E3779B97F4A7C15F39CC0605CEDC835
 
@@ -84,7 +86,7 @@ def product(a_high, a_low, b_high, b_low):
 
 @compiled
 def total(a_high, a_low, b_high, b_low):
-    """Their sum, likewise."""
+    """The sum of two numbers of 128 bits, modulo 2^128, as its high and low word."""
     low = a_low + b_low
     return a_high + b_high + np.uint64(low < a_low), low
 
@@ -96,18 +98,18 @@ def next_bits(stream):
     high, low = total(high, low, stream[2], stream[3])
     stream[0], stream[1] = high, low
     bits, turn = high ^ low, high >> TOP
-    return (bits >> turn) | (bits << ((FULL - turn) & (FULL - ONE)))
+    return (bits >> turn) | (bits << ((FULL - turn) & (FULL - ONE)))  # a shift by 64 is undefined
 
 
 @compiled
 def uniform(stream):
     """From [0, 1)."""
-    return np.float64(next_bits(stream) >> ELEVEN) * (1.0 / 9007199254740992.0)
+    return np.float64(next_bits(stream) >> ELEVEN) * 2.0**-53
 
 
 @compiled
 def normal(stream):
-    """Of mean 0 and standard deviation 1."""
+    """Of mean 0 and standard deviation 1. Which bits are layer, sign and place, also the tail's, is numpy's choice."""
     while True:
         bits = next_bits(stream)
         layer = bits & LAYER
@@ -120,12 +122,12 @@ def normal(stream):
             return x
         if layer == 0:
             while True:
-                beyond = -NORMAL_INVERSE_TAIL * np.log1p(-uniform(stream))
-                height = -np.log1p(-uniform(stream))
+                beyond = -NORMAL_INVERSE_TAIL * math.log1p(-uniform(stream))
+                height = -math.log1p(-uniform(stream))
                 if height + height > beyond * beyond:
                     return -(NORMAL_TAIL + beyond) if (place >> EIGHT) & ONE else NORMAL_TAIL + beyond
-        low, high = NORMAL_HEIGHT[layer], NORMAL_HEIGHT[layer - ONE]
-        if (high - low) * uniform(stream) + low < np.exp(-0.5 * x * x):
+        outer, inner = NORMAL_HEIGHT[layer], NORMAL_HEIGHT[layer - ONE]
+        if (inner - outer) * uniform(stream) + outer < math.exp(-0.5 * x * x):
             return x
 
 
@@ -140,9 +142,9 @@ def exponential(stream):
         if place < EXPONENTIAL_EDGE[layer]:
             return x
         if layer == 0:
-            return EXPONENTIAL_TAIL - np.log1p(-uniform(stream))
-        low, high = EXPONENTIAL_HEIGHT[layer], EXPONENTIAL_HEIGHT[layer - ONE]
-        if (high - low) * uniform(stream) + low < np.exp(-x):
+            return EXPONENTIAL_TAIL - math.log1p(-uniform(stream))
+        outer, inner = EXPONENTIAL_HEIGHT[layer], EXPONENTIAL_HEIGHT[layer - ONE]
+        if (inner - outer) * uniform(stream) + outer < math.exp(-x):
             return x
 
 
@@ -173,13 +175,23 @@ def draw_years(streams, draws):
             draws[k, n] = uniform(disturbance)
 
 
-@functools.cache
 def drawer(backend: str):
     """`draw_years`, compiled or loaded; of the `python` backend interpreted."""
-    if backend == "python":
-        return np.errstate(over="ignore")(uncompiled(draw_years))
-    with MAKING, alone("draws"):
-        nothing = np.empty((0, len(STREAMS), WORDS), np.uint64), np.empty((0, DRAWS_SIZE))
+    with MAKING:  # of the threads that come together one makes it
+        return interpreted() if backend == "python" else made()
+
+
+@functools.cache
+def interpreted():
+    """`draw_years` as plain Python."""
+    return np.errstate(over="ignore")(uncompiled(draw_years))
+
+
+@functools.cache
+def made():
+    """Compiled or loaded."""
+    nothing = np.empty((0, len(STREAMS), WORDS), np.uint64), np.empty((0, DRAWS_SIZE))
+    with alone("draws"):
         return made_ready(specialised(draw_years, "draws"), *nothing)
 
 

@@ -143,7 +143,8 @@ class Stands:
             cuda.check_gpu()
             self.lanes = cuda.STANDS
             self._run_block = cuda.run_stands
-        self._pool = None
+        self._pool: ThreadPoolExecutor | None = None
+        self._pool_of = os.getpid()
 
         self.parameters = np.zeros((self.number, len(PARAMETER_NAMES)))
         self.state = np.zeros((self.number, STATE_SIZE))
@@ -441,10 +442,15 @@ class Stands:
         return draws
 
     def _threads(self) -> ThreadPoolExecutor:
-        """The threads, which wait where there is nothing to do."""
-        if self._pool is None:
+        """The threads, which wait where there is nothing to do; a forked process has none of its parent's."""
+        if self._pool is None or self._pool_of != os.getpid():
             self._pool = ThreadPoolExecutor(self.threads, thread_name_prefix="stands")
+            self._pool_of = os.getpid()
         return self._pool
+
+    def __getstate__(self) -> dict:
+        """What a copy has, or another process: all but the threads."""
+        return self.__dict__ | {"_pool": None}
 
     def _check(self, stands, parameters, state, record, what) -> None:
         def describe(k):

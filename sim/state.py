@@ -44,7 +44,7 @@ STATE = {
     "acclimation": ("degC", "temperature that photosynthesis is acclimated to"),
 }
 
-#: A year's random numbers: name -> (per day?, distribution, the stream that they are from).
+#: A year's random numbers, as `sim.draws.draw_years` draws them: name -> (per day?, distribution, stream).
 DRAWS = {
     "temperature_noise": (True, "normal", "weather"),
     "wet_dice": (True, "uniform", "weather"),
