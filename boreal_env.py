@@ -24,7 +24,7 @@ if not Path(__file__).with_name("sim").samefile(_found := getattr(sim, "__path__
 
 from sim.block import kernel, lanes_for
 from sim.management import NUM_ACTIONS, as_array
-from sim.parameters import brief, check_name, check_overrides, check_seed
+from sim.parameters import brief, check_name, check_overrides, check_seed, is_integer
 from sim.saved import restored_generator
 from sim.stands import check_threads, positive_integer
 from sim.task.actions import NO_CHANGE, MaskFunction, action_masks, valid_actions, where_valid
@@ -379,7 +379,7 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
         if render_mode is not None:
             raise ValueError(f"render_mode {render_mode!r}: the vector environment draws nothing; None is allowed")
         for name, value in (("num_envs", num_envs), ("group_size", group_size)):
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= MOST_ENVS:
+            if not is_integer(value) or not 1 <= value <= MOST_ENVS:
                 raise ValueError(f"{name}: an integer in [1, {MOST_ENVS}] is allowed, got {value!r}")
         if num_envs % group_size:
             raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
@@ -468,12 +468,21 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
     def get_state(self) -> dict:
         """Everything the future depends on, generators included; picklable."""
         generators = [generator.bit_generator.state for generator in self._generators or []]
-        return {"episodes": self._episodes.get_state(), "generators": generators or None}
+        return {
+            "episodes": self._episodes.get_state(),
+            "generators": generators or None,
+            "group_size": self.group_size,
+        }
 
     def set_state(self, state: dict) -> None:
         """Continue from `get_state`."""
         check_saved(state, "vector")
+        if state["group_size"] != self.group_size:
+            groups = f"groups of {brief(state['group_size'])}, these are of {self.group_size}"
+            raise ValueError(f"state of {groups}: make both with the same group_size")
         generators = state["generators"]  # None before the first reset
+        if generators is None and isinstance(state["episodes"], dict) and np.any(state["episodes"].get("running")):
+            raise ValueError("state: generators of episodes that run are allowed, got None")
         if generators is not None:
             known = [restored_generator(saved) for saved in generators if saved] if isinstance(generators, list) else []
             if len(known) != self.num_envs:

@@ -46,6 +46,14 @@ def folder_of(config: dict, archive_dir: Path) -> Path:
     return archive_dir / config["script"] / folder_name(arguments["env_id"], changed) / f"seed{arguments['seed']}"
 
 
+def is_whole(path: Path) -> bool:
+    """Whether it is a zip whose members are as they were written."""
+    if not zipfile.is_zipfile(path):
+        return False
+    with zipfile.ZipFile(path) as packed:
+        return packed.testzip() is None
+
+
 def archive_run(run: runs.Run, archive_dir: Path, jobs: list[experiments.Job]) -> bool:
     """Archive a run, its policy if a job of the main table made it; False if the archive has it, of the same
     commit.
@@ -55,9 +63,10 @@ def archive_run(run: runs.Run, archive_dir: Path, jobs: list[experiments.Job]) -
     keeps_policy = policy.exists() and any(job.experiment in MAIN and job.made(run.config) for job in jobs)
     kept = {"config.json": config} | ({POLICY: policy.read_bytes()} if keeps_policy else {})
     there = {name: (folder / name).read_bytes() for name in kept if (folder / name).exists()}
-    if there == kept and (folder / runs.ARCHIVED).exists():
+    if there == kept and is_whole(folder / runs.ARCHIVED):
         return False
-    shutil.rmtree(folder, ignore_errors=True)
+    if folder.exists():
+        shutil.rmtree(folder)
     folder.mkdir(parents=True)
     for name, content in kept.items():
         with protocol.replacing(folder / name) as file:

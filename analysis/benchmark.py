@@ -173,7 +173,7 @@ def threads(args: Args, stack: ExitStack) -> list[Measurement]:
 
 def physics_alone(groups: list[sim.Stands], pool: ThreadPoolExecutor) -> float:
     """Time of a year of the physics and nothing else [s]: a call for each group of stands, on all cores."""
-    draws = [group._draw(np.arange(group.number)) for group in groups]
+    draws = [group._draw(group.streams.copy()) for group in groups]
 
     def year(group, draw):
         group._run(np.arange(group.number), draw, np.full(group.number, boreal_env.NO_CHANGE))

@@ -113,7 +113,7 @@ def blocks_at(moments: dict, lanes: int) -> dict[str, tuple]:
         lanes,
         stands.parameters,
         stands.state,
-        stands._draw(np.arange(lanes)),
+        stands._draw(stands.streams.copy()),
         np.full(lanes, NO_CHANGE),
         first_cut_age=stands.first_cut_age,
         products_decay=stands.products_decay,

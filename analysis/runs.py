@@ -24,6 +24,7 @@ NAMES_IN_TABLES = ("policy", "variable", "phase")  # columns of a run's tables t
 OF_CONFIG = {"script": str, "not_default": dict, "arguments": dict}
 OF_ARGUMENTS = {"env_id": str, "mode": str, "seed": int, "eval_weights": list, "eval_episodes": int}
 OF_ARGUMENTS |= {"thaw_formulation": str, "site_seed": int | None}
+OF_TRAINING = {"total_timesteps": int | None, "num_envs": int | None}
 
 # Arguments that do not make another row: what tells its runs apart, what the row has a column for, and the output.
 NOT_A_SETTING = ("seed", "site_seed", "preference", "mode", "env_id", "run_dir", "overwrite")
@@ -155,7 +156,10 @@ def read_config(folder: Path) -> dict:
         config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
         check_kinds(config, OF_CONFIG)
         check_kinds(config["arguments"], OF_ARGUMENTS)
-    except (ValueError, KeyError, TypeError) as error:
+        check_kinds({**dict.fromkeys(OF_TRAINING), **config["arguments"]}, OF_TRAINING)
+        if Path(config["script"]).name != config["script"]:
+            raise ValueError(f"script is {config['script']!r}, no name of one")
+    except (ValueError, KeyError, TypeError, OSError) as error:
         raise ValueError(f"damaged: config.json ({error!r})") from error
     return config
 

@@ -92,7 +92,7 @@ def year(stands: sim.Stands) -> float:
 def physics(stands: sim.Stands) -> float:
     """Stand-years a second of a year whose random numbers are drawn already."""
     which = np.arange(stands.number)
-    draws = stands._draw(which)
+    draws = stands._draw(stands.streams.copy())
     start = time.perf_counter()
     stands._run(which, draws, np.full(stands.number, boreal_env.NO_CHANGE))
     return stands.number / (time.perf_counter() - start)

@@ -79,7 +79,7 @@ def numbers(text: str) -> list[int]:
     """1-3,7 as 1, 2, 3, 7."""
     found = []
     for part in text.split(","):
-        match = re.fullmatch(r"(\d+)(?:-(\d+))?", part)
+        match = re.fullmatch(r"([0-9]+)(?:-([0-9]+))?", part)
         if match is None:
             protocol.fail(f"--seeds {text}: numbers and ranges are allowed, such as 1-10 or 1,3,7-9")
         low, high = int(match[1]), int(match[2] or match[1])
@@ -126,6 +126,8 @@ def words_of(settings: dict[str, str], fields: dict[str, dataclasses.Field]) -> 
     words = []
     for name, value in settings.items():
         flag = name.replace("_", "-")
+        if hidden := next((word for word in value.split() if word.startswith("--")), None):
+            protocol.fail(f"--grid {name}={value}: values are allowed, no other flag such as {hidden}")
         if fields[name].type is bool and value.lower() in ("true", "false"):
             words.append(f"--{flag}" if value.lower() == "true" else f"--no-{flag}")
         else:
@@ -161,7 +163,7 @@ def all_runs(args: Args) -> list[Run]:
 
 def part_of(found: list[Run], part: str) -> list[Run]:
     """Every nth run from the kth on, for "k/n"."""
-    match = re.fullmatch(r"(\d+)/(\d+)", part)
+    match = re.fullmatch(r"([0-9]+)/([0-9]+)", part)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
         protocol.fail(f"--part {part}: k/n with k from 1 to n is allowed")
     return found[int(match[1]) - 1 :: int(match[2])]

@@ -94,11 +94,11 @@ def policy_file(run_or_name) -> Path:
     if not isinstance(run_or_name, (str, os.PathLike)):
         raise ValueError(f"policy {run_or_name!r}: a run's folder, a file, or the name of one that ships is allowed")
     path, ships = Path(run_or_name), shipped_policies()
-    if path.is_dir():
+    if os.path.isdir(path):  # a name too long for the file system is no folder; Path's own would raise
         path = path / POLICY
-    elif not path.exists():
+    elif not os.path.exists(path):
         path = ships.get(str(run_or_name), path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise FileNotFoundError(
             f"{run_or_name or repr('')}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a "
             f"policy that ships ({', '.join(ships) or 'none does yet'})"
@@ -131,6 +131,9 @@ def parse(arguments: type):
     prepare_output()
     # the million objects that imports make all stay: to search them for garbage time and again is a third of a start
     gc.set_threshold(20_000, 20, 20)
+    if "" in sys.argv[1:]:
+        before = sys.argv[sys.argv.index("", 1) - 1]
+        fail(f"{before + ' ' if before.startswith('--') else ''}'': a value is allowed, not an empty text")
     require("tyro", "matplotlib", "moocore", *(["torch"] if hasattr(arguments, "total_timesteps") else []))
     import tyro
 
@@ -215,9 +218,7 @@ def check_run_dir(args) -> None:
     given = getattr(args, "run_dir", None)
     if given is None:
         return
-    if given == "":
-        fail("--run-dir '': the name of a folder is allowed")
-    there = next(path for path in (Path(given).absolute(), *Path(given).absolute().parents) if path.exists())
+    there = next(path for path in (Path(given).absolute(), *Path(given).absolute().parents) if os.path.exists(path))
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
         fail(
             f"--run-dir {given}: cannot write there ({'not a folder' if there.is_file() else 'no permission'}: {there})"

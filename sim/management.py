@@ -63,7 +63,7 @@ def check_actions(actions, number, of="stands") -> np.ndarray:
     values = as_array(actions)
     if values.shape != (number,):
         raise ValueError(f"actions of shape {values.shape}: one integer for each of {number} {of} is allowed")
-    if not np.issubdtype(values.dtype, np.integer):
+    if values.dtype.kind not in "iu":
         wrong = next((value for value in values.tolist() if value not in range(NUM_ACTIONS)), values.tolist()[0])
         raise ValueError(f"action {wrong!r} of type {values.dtype}: integers in [0, {NUM_ACTIONS}) are allowed")
     wrong = values[(values < 0) | (values >= NUM_ACTIONS)]

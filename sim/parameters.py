@@ -262,8 +262,13 @@ def _check_number(name: str, value, parameter: Parameter) -> float:
     return number
 
 
+def is_integer(value) -> bool:
+    """Whether it is an integer of Python or numpy: no truth value, no span of time, both of which pass for one."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
+
+
 def check_seed(name: str, seed) -> int:
     """A seed: an integer in [0, 2^63)."""
-    if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**63:
+    if not is_integer(seed) or not 0 <= seed < 2**63:
         raise ValueError(f"{name}: an integer in [0, 2^63) is allowed, got {seed!r}")
     return int(seed)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim.parameters import brief
+from sim.parameters import brief, is_integer
 
 
 def check_keys(what: str, saved, keys: Sequence[str]) -> None:
@@ -31,7 +31,7 @@ def check_settings(what: str, saved, ours: dict) -> None:
 
 def check_array(what: str, saved, ours: np.ndarray, low: float = -np.inf, high: float = np.inf) -> None:
     """Refuse what is no array of the shape and type of ours, or has a number outside [low, high], or NaN."""
-    if not isinstance(saved, np.ndarray) or saved.dtype != ours.dtype:
+    if type(saved) is not np.ndarray or saved.dtype != ours.dtype:  # a masked array's mask would be lost
         got = getattr(saved, "dtype", type(saved).__name__)
         raise ValueError(f"{what}: an array of {ours.dtype} is allowed, got {got}")
     if saved.shape != ours.shape:
@@ -49,6 +49,9 @@ def restored_generator(state):
     generator = np.random.default_rng(0)
     try:
         generator.bit_generator.state = state
+        words = state["state"]
+        if not is_integer(words["state"]) or not is_integer(words["inc"]) or words["inc"] % 2 == 0:
+            raise ValueError("a PCG64's increment is odd")
     except (TypeError, ValueError, KeyError, OverflowError):
         raise ValueError(f"state of a generator: that of a PCG64 is allowed, got {brief(state)}") from None
     return generator

@@ -12,7 +12,7 @@ from sim.io.dataset import import_xarray, to_dataset
 from sim.io.disaggregation import climate_of
 from sim.jit import uncompiled
 from sim.management import NO_CHANGE, as_array, check_actions, decode
-from sim.parameters import SITE_PARAMETERS, brief, check_mapping, middle_site
+from sim.parameters import SITE_PARAMETERS, brief, check_mapping, is_integer, middle_site
 from sim.physical_constants import FREEZING_POINT_K
 from sim.scenario import FIRST_YEAR
 from sim.spin_up import BOUNDARIES, BOUNDARY, INITIAL_RANGES, check_initial, crown_covers, first_state, first_stems
@@ -210,7 +210,7 @@ def simulate(
 def _check_years(years, forcing, interval: int) -> int:
     if years is None:
         return DEFAULT_YEARS if forcing is None else max(1, len(forcing) * interval // (1440 * DAYS))
-    if isinstance(years, bool) or not isinstance(years, (int, np.integer)) or years < 1:
+    if not is_integer(years) or years < 1:
         raise ValueError(f"years: a positive integer is allowed, got {years!r}")
     if years > MOST_YEARS:
         raise ValueError(f"years = {years}: at most {MOST_YEARS} are allowed")

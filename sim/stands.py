@@ -28,8 +28,10 @@ from sim.parameters import (
     check_mechanisms,
     check_name,
     check_overrides,
+    check_seed,
     check_site,
     check_weather,
+    is_integer,
 )
 from sim.saved import check_array, check_keys
 from sim.scenario import CO2, WITHOUT_SCENARIO, check_scenario
@@ -169,8 +171,7 @@ class Stands:
                 raise ValueError(f"{what}: one for each of {len(stands)} stands is allowed, got {len(values)}")
         for site, its_seeds in zip(sites, seeds, strict=True):
             check_site(site)
-            if not isinstance(its_seeds, Seeds):
-                raise ValueError(f"seeds: sim.episode_seeds give them, got {brief(its_seeds)}")
+            check_seeds("seeds", its_seeds)
         if observed is not None:
             check_observed(observed, len(observed))
         for k, stand in enumerate(stands):
@@ -270,11 +271,15 @@ class Stands:
                 raise RuntimeError(f"stand {stand} has not been started")
         once, alike = self._alike(stands, actions, parameters)
         rows = np.empty((len(once), days, len(DAILY))) if daily else None
-        state, record = self._run(stands[once], None, actions[once], observed, days, rows, parameters=parameters[once])
+        streams = self.streams[stands[once]]
+        state, record = self._run(
+            stands[once], None, actions[once], observed, days, rows, parameters=parameters[once], streams=streams
+        )
         self._check(stands[once], parameters[once], state, record, "year")
         if len(once) < len(stands):
-            self.streams[stands] = self.streams[stands[once[alike]]]
-            state, record, rows = state[alike], record[alike], None if rows is None else rows[alike]
+            streams, state, record = streams[alike], state[alike], record[alike]
+            rows = None if rows is None else rows[alike]
+        self.streams[stands] = streams
         self.state[stands] = state
         self.record[stands] = record
         self.years[stands] += 1
@@ -337,11 +342,8 @@ class Stands:
             "seeds": list(self.seeds),
         }
 
-    def set_state(self, state: dict) -> None:
-        """Continue from a `get_state` of as many stands; ValueError, and nothing done, for what is none.
-
-        Constants, mechanisms and weather are the state's from then on, all else is as these stands have it.
-        """
+    def check_state(self, state: dict) -> None:
+        """ValueError for what is no `get_state` of as many stands."""
         what = "state of stands"
         check_keys(what, state, SAVED)
         if np.shape(state["years"]) != self.years.shape:
@@ -354,13 +356,19 @@ class Stands:
         for seeds, row, streams in zip(state["seeds"], state["parameters"], state["streams"], strict=True):
             if seeds is None:  # not started yet
                 continue
-            if not isinstance(seeds, Seeds):
-                raise ValueError(f"{what}: seeds: sim.Seeds are allowed, got {brief(seeds)}")
+            check_seeds(f"{what}: seeds", seeds)
             if not all(streams[:, -1] & np.uint64(1)):
                 raise ValueError(f"{what}: streams: a PCG64's increment is odd, got {streams[:, -1].tolist()}")
             values = dict(zip(PARAMETER_NAMES, row.tolist(), strict=True))
             check_overrides({name: values[name] for name in SITE_PARAMETERS})
             check_constants({name: values[name] for name in self.constants})
+
+    def set_state(self, state: dict) -> None:
+        """Continue from a `get_state` of as many stands; ValueError, and nothing done, for what is none.
+
+        Constants, mechanisms and weather are the state's from then on, all else is as these stands have it.
+        """
+        self.check_state(state)
         for name in ARRAYS:
             setattr(self, name, state[name].copy())
         self.seeds = list(state["seeds"])
@@ -380,11 +388,23 @@ class Stands:
             "harvest_min_class": self.first_cut_age,
         }
 
-    def _run(self, stands, draws, actions, observed=None, days=DAYS, daily=None, steps_per_day=None, parameters=None):
+    def _run(
+        self,
+        stands,
+        draws,
+        actions,
+        observed=None,
+        days=DAYS,
+        daily=None,
+        steps_per_day=None,
+        parameters=None,
+        streams=None,
+    ):
         """The new states and records of a year: (stands, fields) each.
 
-        draws : of the year, (stands, fields), or None to draw them, each thread those of its stands;
-        parameters : of the year, (stands, fields), or None for those without a scenario.
+        draws : of the year, (stands, fields), or None to draw them from `streams`, each thread those of its stands;
+        parameters : of the year, (stands, fields), or None for those without a scenario;
+        streams : (stands, streams, words), left after what is drawn.
         """
         parameters = self.parameters[stands] if parameters is None else parameters
         state = np.empty((len(stands), STATE_SIZE))
@@ -392,7 +412,7 @@ class Stands:
 
         def run(chunk):
             rows = None if daily is None else daily[chunk]
-            drawn = self._draw(stands[chunk]) if draws is None else draws[chunk]
+            drawn = self._draw(streams[chunk]) if draws is None else draws[chunk]
             state[chunk], record[chunk] = self._run_block(
                 parameters[chunk],
                 self.state[stands[chunk]],
@@ -429,16 +449,15 @@ class Stands:
                 raise ValueError(f"initial: positions in [0, {number}) are allowed, got {position!r}")
         return [check_stocks((initial or {}).get(k)) for k in range(number)]
 
-    def _draw(self, stands) -> np.ndarray:
-        """The random numbers of the stands' next year, (stands, fields)."""
-        streams, draws = self.streams[stands], np.empty((len(stands), DRAWS_SIZE))
+    def _draw(self, streams) -> np.ndarray:
+        """The random numbers of a year, (stands, fields), from the stands' streams, which are left after them."""
+        draws = np.empty((len(streams), DRAWS_SIZE))
         draw = drawer(self.backend)
-        parts = blocks(len(stands), DRAWN_AT_ONCE)
+        parts = blocks(len(streams), DRAWN_AT_ONCE)
         if len(parts) == 1:
             draw(streams, draws)
         else:
             list(self._threads().map(lambda part: draw(streams[part], draws[part]), parts))
-        self.streams[stands] = streams
         return draws
 
     def _threads(self) -> ThreadPoolExecutor:
@@ -489,9 +508,17 @@ def yearly_decay(half_life_years) -> float:
     return 1.0 - 0.5 ** (1.0 / half_life_years)
 
 
+def check_seeds(name: str, seeds) -> None:
+    """Raise ValueError for what is no `Seeds` of seeds."""
+    if not isinstance(seeds, Seeds):
+        raise ValueError(f"{name}: sim.Seeds are allowed, as sim.episode_seeds gives them, got {brief(seeds)}")
+    for stream, seed in seeds._asdict().items():
+        check_seed(f"{name}: {stream}", seed)
+
+
 def positive_integer(name, value) -> int:
     """A count that was given. Raises ValueError naming it."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 1:
+    if not is_integer(value) or value < 1:
         raise ValueError(f"{name}: a positive integer is allowed, got {value!r}")
     return int(value)
 

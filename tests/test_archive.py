@@ -97,6 +97,24 @@ def test_agents_of_the_main_experiment_are_kept(tmp_path):
     assert kept["boreal-generalist-v0-vectorization=lockstep"].read_bytes() == b"others"
 
 
+def test_a_damaged_archive_is_written_again(archived):
+    broken = next(archived.rglob("tables.zip"))
+    whole = broken.read_bytes()
+    broken.write_bytes(whole[: len(whole) // 2])
+    archive.archive(TINY_RUNS, archived)
+    assert broken.read_bytes() == whole
+
+
+def test_a_script_that_is_no_name_leads_nowhere(tmp_path, capsys):
+    folder = tmp_path / "runs" / "one"
+    shutil.copytree(TINY_RUNS / "zero_change", folder)
+    config = folder / "config.json"
+    config.write_text(config.read_text(encoding="utf-8").replace('"zero_change"', '"../../evil"', 1), encoding="utf-8")
+    archive.archive(tmp_path / "runs", tmp_path / "a" / "b")
+    assert "script is '../../evil', no name of one" in capsys.readouterr().err
+    assert not list(tmp_path.rglob("evil"))
+
+
 def test_a_damaged_archive_is_named(archived):
     next(archived.rglob("tables.zip")).write_bytes(b"no zip")
     assert "damaged: tables.zip" in runs.read_runs(archived)[1][0]

@@ -66,14 +66,15 @@ def test_stands_are_copied_and_forked_after_their_threads_have_worked(monkeypatc
     monkeypatch.setattr(stands, "DRAWN_AT_ONCE", 2)
     five = sim.Stands(5, threads=2)
     five.streams[:] = streams(5)
-    five._draw(np.arange(5))
+    five._draw(five.streams)
     copied = pickle.loads(pickle.dumps(five))
-    expected = copied._draw(np.arange(5))
-    np.testing.assert_array_equal(copy.deepcopy(five)._draw(np.arange(5)), expected)
+    expected = copied._draw(copied.streams)
+    again = copy.deepcopy(five)
+    np.testing.assert_array_equal(again._draw(again.streams), expected)
     if "fork" in multiprocessing.get_all_start_methods():
         fork = multiprocessing.get_context("fork")
         here, there = fork.Pipe()
-        child = fork.Process(target=lambda: there.send(five._draw(np.arange(5))), daemon=True)
+        child = fork.Process(target=lambda: there.send(five._draw(five.streams)), daemon=True)
         child.start()
         assert here.poll(60)
         np.testing.assert_array_equal(here.recv(), expected)
@@ -85,7 +86,7 @@ def test_threads_draw_what_one_does(monkeypatch):
         monkeypatch.setattr(stands, "DRAWN_AT_ONCE", at_once)
         five = sim.Stands(5, threads=2)
         five.streams[:] = streams(5)
-        results.append((five._draw(np.arange(5)), five.streams))
+        results.append((five._draw(five.streams), five.streams))
     for alone, together in zip(*results, strict=True):
         np.testing.assert_array_equal(alone, together)
 

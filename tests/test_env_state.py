@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from playing import assert_same, quick, quick_vector, vector_trace
 
+import boreal_env
+import sim
+
 
 def test_an_episode_resumes_from_its_state():
     env = quick(record_years=True)
@@ -108,6 +111,10 @@ def test_the_state_of_one_with_other_arguments_is_refused(arguments):
         ("stands", "years", -1, r"stands: years: \[0, 1000\] is allowed, got -1"),
         ("episodes", "weights", -1.0, r"episodes: weights: \[0, 1\] is allowed, got -1"),
         ("episodes", "year", 99, r"episodes: year: \[0, \d\] is allowed, got 99"),
+        ("episodes", "year", 4, r"episodes: an episode that runs is before year 4, got \[4\]"),
+        ("episodes", "year", 1, "episodes: episode 0 runs in year 1, its stand does not"),
+        ("episodes", "weights", 1.0, r"episodes: weights whose sum is 1 are allowed, got \[\[1.0, 1.0\]\]"),
+        ("stands", "streams", 4, r"stands: streams: a PCG64's increment is odd, got \[4, 4\]"),
     ],
 )
 def test_a_damaged_state_is_refused_and_nothing_of_it_taken(part, name, value, wrong):
@@ -120,7 +127,19 @@ def test_a_damaged_state_is_refused_and_nothing_of_it_taken(part, name, value, w
     assert pickle.dumps(env.get_state()) == before
 
 
-@pytest.mark.parametrize("generator", [None, {"bit_generator": "PCG64"}, {"bit_generator": "MT19937"}, 3])
+def test_a_mask_is_not_lost_in_silence():
+    env = quick()
+    env.reset(seed=1)
+    saved = env.get_state()
+    saved["episodes"]["observed"] = np.ma.masked_greater(saved["episodes"]["observed"], 1.0)
+    with pytest.raises(ValueError, match="observed: an array of float64 is allowed"):
+        env.set_state(saved)
+
+
+EVEN = {**np.random.PCG64(1).state, "state": {"state": 5, "inc": 4}}
+
+
+@pytest.mark.parametrize("generator", [None, {"bit_generator": "PCG64"}, {"bit_generator": "MT19937"}, 3, EVEN])
 def test_a_state_without_its_generator_is_refused_and_nothing_of_it_taken(generator):
     env, other = quick(), quick()
     env.reset(seed=1), other.reset(seed=2)
@@ -137,6 +156,56 @@ def test_generators_of_fewer_stands_are_refused():
     saved["generators"].pop()
     with pytest.raises(ValueError, match="^state: generators of 2 stands are allowed, got 1$"):
         envs.set_state(saved)
+
+
+def test_groups_and_generators_of_episodes_that_run_are_needed():
+    envs = quick_vector(4, group_size=2)
+    envs.reset(seed=1)
+    with pytest.raises(ValueError, match="^state of groups of 2, these are of 1: "):
+        quick_vector(4).set_state(envs.get_state())
+    with pytest.raises(ValueError, match="^state: generators of episodes that run are allowed, got None$"):
+        envs.set_state(envs.get_state() | {"generators": None})
+
+
+def test_a_year_that_fails_changes_nothing():
+    """Not even the weather to come."""
+    one = quick()
+    one.reset(seed=1)
+    stands, good = one._episodes.stands, one._episodes.stands.get_state()
+    stands.state[0, sim.stands.STATE_NAMES.index("albedo")] = 1e6
+    before = pickle.dumps(stands.get_state())
+    with pytest.raises(sim.PhysicsError):
+        stands.step([12])
+    assert pickle.dumps(stands.get_state()) == before
+    assert not np.array_equal(stands.state, good["state"])
+
+
+def test_after_an_objectives_error_only_a_reset_goes_on():
+    def fails_once(year):
+        calls.append(year)
+        if len(calls) == 1:
+            raise ZeroDivisionError
+        return 0.0 * year["biomass_kgc_m2"]
+
+    calls = []
+    env = quick(objectives=("carbon", boreal_env.Objective("mine", fails_once, 0.0, 1.0)))
+    env.reset(seed=1)
+    with pytest.raises(ZeroDivisionError):
+        env.step(12)
+    with pytest.raises(RuntimeError, match="call reset first"):
+        env.step(12)
+    env.reset(seed=1)
+    env.step(12)
+
+
+@pytest.mark.parametrize("action", [np.timedelta64(12), np.array(True)])
+def test_a_refused_action_changes_nothing(action):
+    env = quick()
+    env.reset(seed=1)
+    before = pickle.dumps(env.get_state())
+    with pytest.raises(ValueError, match=r"integers in \[0, 25\) are allowed"):
+        env.step(action)
+    assert pickle.dumps(env.get_state()) == before
 
 
 def test_the_state_of_a_vector_environment_is_not_that_of_one():

@@ -69,7 +69,7 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
 @pytest.mark.parametrize(
     "given, message",
     [
-        (["--run-dir", ""], "--run-dir '': the name of a folder is allowed"),
+        (["--run-dir", ""], "--run-dir '': a value is allowed, not an empty text"),
         (
             ["--env-id", "boreal-v9"],
             "--env-id boreal-v9: Environment `boreal` doesn't exist.*allowed: boreal-generalist.*",

@@ -193,7 +193,18 @@ def test_a_damaged_checkpoint_is_refused(interrupted, tmp_path, harm):
     assert before == {path: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.parametrize("state", [[1], {"weights": 1}, {"script": "ppo_mine"}])
+@pytest.mark.parametrize(
+    "state",
+    [
+        [1],
+        {"weights": 1},
+        {"script": "ppo_mine"},
+        {"script": "ppo_gated", "global_step": 5},
+        {"script": "ppo_gated", "global_step": "5", "envs": [], "random_states": (), "table_sizes": {}},
+        {"script": "ppo_gated", "global_step": 10**9, "envs": [], "random_states": (), "table_sizes": {}},
+        {"script": "ppo_gated", "global_step": 5, "envs": [], "random_states": (), "table_sizes": {}},
+    ],
+)
 def test_a_checkpoint_of_another_program_is_refused(interrupted, tmp_path, state):
     folder = copy(interrupted, tmp_path)
     torch.save(state, folder / "checkpoint.pt")

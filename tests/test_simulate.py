@@ -809,7 +809,12 @@ SEED = sim.episode_seeds(0)
         (lambda s: s.start(0, [{**MIDDLE, "latitude_deg": "64"}], [SEED]), "latitude_deg: a finite number is allowed"),
         (lambda s: s.start(0, [{**MIDDLE, "latitude": 64.0}], [SEED]), "unknown site parameter 'latitude'"),
         (lambda s: s.start(0, [{"latitude_deg": 64.0}], [SEED]), "site: mean_annual_temperature_c is missing"),
-        (lambda s: s.start(0, [MIDDLE], [0]), "seeds: sim.episode_seeds give them, got 0"),
+        (lambda s: s.start(0, [MIDDLE], [0]), "seeds: sim.Seeds are allowed, as sim.episode_seeds gives them, got 0"),
+        (
+            lambda s: s.start(0, [MIDDLE], [sim.Seeds(1, None, 1)]),
+            r"seeds: weather: an integer in \[0, 2\^63\) .* None",
+        ),
+        (lambda s: s.start(0, [MIDDLE], [sim.Seeds(-1, 1, 1)]), "seeds: start: an integer in .* got -1"),
         (lambda s: s.start([0, 1], [MIDDLE], [SEED]), "sites: one for each of 2 stands is allowed, got 1"),
         (lambda s: s.start(0, [MIDDLE], [SEED], {0: {"density": 3}}), "unknown initial stock 'density'"),
         (lambda s: s.start(0, [MIDDLE], [SEED], {5: {}}), r"initial: positions in \[0, 1\) are allowed, got 5"),

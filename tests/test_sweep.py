@@ -96,6 +96,8 @@ def test_a_slurm_array_is_its_parts(tmp_path):
         ({"grid": ["seed=1,2"]}, "unknown flag 'seed'"),
         ({"grid": ["learning_rate"]}, "flag=value"),
         ({"grid": ["learning_rate=fast"]}, "fast"),
+        ({"grid": ["learning_rate=1e-4 --seed 9"]}, "values are allowed, no other flag such as --seed"),
+        ({"seeds": "\N{ARABIC-INDIC DIGIT ONE}-3"}, "numbers and ranges are allowed"),
         ({"grid": ["learning_rate=2"]}, r"--learning-rate must lie in \[1e-12, 1\]"),
         ({"seeds": "1-999999999"}, "--seeds 1-999999999: at most 999999 is allowed"),
         ({"script": ROOT / "README.md"}, "README.md: no script there, a file that ends in .py"),

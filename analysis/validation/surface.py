@@ -66,10 +66,10 @@ class RecordedStands(sim.Stands):
         self._run(np.arange(self.number), draws, np.full(self.number, NO_CHANGE))
         return self.surface
 
-    def _run(self, stands, draws, actions, *arguments, **options):
+    def _run(self, stands, draws, actions, *arguments, streams=None, **options):
         """The year as `sim.Stands` runs it, after a first time that records its surface, unless its steps are other
         than the stands'."""
-        draws = self._draw(stands) if draws is None else draws
+        draws = self._draw(streams) if draws is None else draws
         if options.get("steps_per_day", self.steps_per_day) == self.steps_per_day:
             number = len(stands)
             block, _ = filled_block(

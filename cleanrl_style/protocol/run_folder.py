@@ -137,10 +137,11 @@ class Run:
                 course = Course(task, args.total_timesteps, args.eval_episodes, self.checkpoint_step)
                 if course.fits:
                     self.course, tables = course, {**tables, "validation": course.columns}
-            sizes = self.checkpoint["table_sizes"] if self.checkpoint else {}
+            sizes = self.checkpoint["table_sizes"] if self.checkpoint else dict.fromkeys(tables, 0)
+            if set(sizes) != set(tables):
+                self._no_checkpoint()
             self.tables |= {
-                name: Table(self.folder / f"{name}.csv", columns, sizes.get(name, 0))
-                for name, columns in tables.items()
+                name: Table(self.folder / f"{name}.csv", columns, sizes[name]) for name, columns in tables.items()
             }
         self.trackers = tracking.start(args, self.script, self.folder, self.config, self.checkpoint_step)
         print(f"{self.script}: {args.env_id}, seed {args.seed}, into {self.folder}", flush=True)
@@ -179,6 +180,8 @@ class Run:
         *rows, half_a_row = self.lock.read().split(b"\n")
         try:
             earlier = float(rows[-1].split(b",")[-1]) if len(rows) > 1 else 0.0
+            if not 0.0 <= earlier < np.inf:
+                raise ValueError(earlier)
         except ValueError:
             fail(f"{timing_file} is damaged; --overwrite starts over")
         self.start = time.perf_counter() - earlier
@@ -203,7 +206,8 @@ class Run:
                 "(--run-dir names another folder, --overwrite starts over)"
             )
         if (self.folder / "evaluation.csv").exists():
-            damaged = damage_of(self.folder, len(self.args.eval_weights))
+            lost = [name for name in self._made_by_all() if not (self.folder / name).exists()]
+            damaged = damage_of(self.folder, len(self.args.eval_weights)) or next(iter(lost), None)
             if damaged:
                 what = "damaged" if (self.folder / damaged).exists() else "missing"
                 fail(f"{self.folder / damaged} is {what}; --overwrite starts over")
@@ -212,6 +216,10 @@ class Run:
         code_here = {**self.config["versions"], **{name: self.config[name] for name in CODE}}
         if code_there != code_here:
             print(f"warning: {self.folder} was begun with {differences(code_there, code_here)}", file=sys.stderr)
+
+    def _made_by_all(self) -> tuple[str, ...]:
+        """Files that every finished run in this environment has."""
+        return ("timing.csv", "summary.png", *(["evaluation_years.csv"] if self.task.boreal else []))
 
     # -------------------------------------------------------------------------------------------- checkpoints
 
@@ -261,8 +269,16 @@ class Run:
             damaged = str(error).splitlines()[0]
         if damaged:
             fail(f"{path} is damaged ({damaged}); --overwrite starts over")
-        if not isinstance(checkpoint, dict) or checkpoint.get("script") != self.script:
-            fail(f"{path} is no checkpoint of this version of {self.script}; --overwrite starts over")
+        steps = getattr(self.args, "total_timesteps", 0)
+        if (
+            not isinstance(checkpoint, dict)
+            or checkpoint.get("script") != self.script
+            or not {"envs", "global_step", "random_states", "table_sizes"} <= checkpoint.keys()
+            or not isinstance(checkpoint["global_step"], int)
+            or not 0 <= checkpoint["global_step"] <= steps
+            or not isinstance(checkpoint["table_sizes"], dict)
+        ):
+            self._no_checkpoint()
         for name, size in checkpoint["table_sizes"].items():
             table = self.folder / f"{name}.csv"
             if not table.exists() or table.stat().st_size < size:
@@ -273,6 +289,10 @@ class Run:
             print(f"{self.args.env_id} gives no state to go on from: the interrupted run starts over", flush=True)
             return
         self.checkpoint, self.checkpoint_step = checkpoint, checkpoint["global_step"]
+
+    def _no_checkpoint(self) -> None:
+        path = self.folder / "checkpoint.pt"
+        fail(f"{path} is no checkpoint of this version of {self.script}; --overwrite starts over")
 
     def resume(self, **parts) -> dict | None:
         """Set environments, generators and `parts` as in the checkpoint, and give its state; None if there is none.

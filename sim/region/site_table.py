@@ -59,7 +59,7 @@ def check_sites(sites, others: str, seed: int) -> pd.DataFrame:
         last = check_seed("seed", seed) + len(table) - 1
         if last >= 2**63:
             raise ValueError(f"seed = {seed}: row k gets seed + k, so at most 2^63 - {len(table)} is allowed")
-        table[SEED] = np.arange(seed, last + 1)
+        table[SEED] = np.arange(len(table)) + np.int64(seed)
     return table.reset_index(drop=True)
 
 

@@ -9,7 +9,7 @@ from gymnasium.spaces import Box
 
 import sim
 from sim.management import check_actions
-from sim.parameters import check_name, check_overrides, check_seed
+from sim.parameters import check_name, check_overrides, check_seed, is_integer
 from sim.saved import check_array, check_keys, check_settings
 from sim.spin_up import BOUNDARY, check_initial_ranges, middle_stocks
 from sim.task.actions import MaskFunction, mask_function, unchanged
@@ -74,7 +74,7 @@ class Episodes:
     ):
         check_name("mode", mode, MODES)
         check_name("thaw_formulation", thaw_formulation, THAW_FORMULATIONS)
-        if isinstance(years, bool) or not isinstance(years, (int, np.integer)) or not 1 <= years <= 1000:
+        if not is_integer(years) or not 1 <= years <= 1000:
             raise ValueError(f"years: an integer in [1, 1000] is allowed, got {years!r}")
         if site_seed is not None:
             check_seed("site_seed", site_seed)
@@ -208,6 +208,7 @@ class Episodes:
             raise RuntimeError(f"step of environment {stopped}, whose episode is over or not begun: call reset first")
         actions = check_actions(actions, self.number)
         record = self.stands.step(actions)
+        self.running = np.zeros(self.number, bool)  # till the year is whole: after an objective's error, reset
         parts = rewards_of_year(record, actions, self.reward, self.thaw_formulation)
         by_name = dict(zip(sim.RECORD_NAMES, record.T, strict=True))
         if self.timber:
@@ -301,7 +302,17 @@ class Episodes:
         for name in SAVED:
             low, high = limits.get(name, (-np.inf, np.inf))
             check_array(f"{what}: {name}", state[name], getattr(self, name), low, high)
-        self.stands.set_state(state["stands"])
+        running, stands = state["running"], state["stands"]
+        if not np.array_equal(running, running & (state["year"] < self.years)):
+            raise ValueError(f"{what}: an episode that runs is before year {self.years}, got {state['year'].tolist()}")
+        weights = state["weights"][running]
+        if not np.allclose(weights.sum(axis=1), 1.0):
+            raise ValueError(f"{what}: weights whose sum is 1 are allowed, got {weights.tolist()}")
+        self.stands.check_state(stands)
+        for i in np.flatnonzero(running):
+            if stands["seeds"][i] is None or stands["years"][i] != state["year"][i]:
+                raise ValueError(f"{what}: episode {i} runs in year {state['year'][i]}, its stand does not")
+        self.stands.set_state(stands)
         for name in SAVED:
             setattr(self, name, state[name].copy())
 
@@ -351,7 +362,7 @@ def check_reset_options(options: dict | None, extra: Sequence[str] = ()) -> dict
 
 def check_saved(state: dict, kind: str) -> None:
     """A dict that `get_state` of the same kind of environment, "single" or "vector", gave."""
-    keys = {"single": ("episodes", "generator"), "vector": ("episodes", "generators")}
+    keys = {"single": ("episodes", "generator"), "vector": ("episodes", "generators", "group_size")}
     for other in keys:
         if other != kind and isinstance(state, dict) and set(state) == set(keys[other]):
             raise ValueError(f"state of a {other} environment given to a {kind} one")
