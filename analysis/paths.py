@@ -32,7 +32,7 @@ def studies(quick: bool = False) -> Path:
 
 def there(folder: Path) -> Path:
     """Where a folder of results is read from: the repository's, if there is none where the command is started."""
-    return folder if folder.is_dir() or QUICK in folder.parts else REPOSITORY / folder
+    return folder if os.path.isdir(folder) or QUICK in folder.parts else REPOSITORY / folder
 
 
 def make_writable(flag: str, folder: Path) -> None:

@@ -618,6 +618,7 @@ BAD = {
     ),
     "an array": (lambda: np.zeros((3, 3)), r"a file, a DataFrame or a Dataset is allowed, got ndarray"),
     "no file": (lambda: "nowhere.csv", r"there is no file nowhere.csv"),
+    "name too long": (lambda: "a" * 300, r"there is no file a{300}"),
 }
 
 
@@ -961,6 +962,10 @@ BAD_FILES = {
     "decimal commas": (
         "TIMESTAMP;TA_F;VPD_F;WS_F;SW_IN_F;P_F\n20190101;1,5;1;1;1;0\n20190102;1,5;1;1;1;0\n",
         r"line 2: TA_F is '1,5'; a number with a decimal point is allowed",
+    ),
+    "fewer fields than names": (
+        "TIMESTAMP,TA_F,VPD_F\n20190101,1\n",
+        r"tower.csv: fields for the header's 3 names are needed",
     ),
     "names of no one": ("date,t,q\n20190101,1,1\n", r"tower.csv: no column for air temperature: none of TA_F"),
     "decimal commas between commas": (

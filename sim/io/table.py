@@ -2,6 +2,7 @@
 
 import csv
 import gzip
+import os
 import re
 import zlib
 from collections.abc import Callable
@@ -60,7 +61,7 @@ def open_table(source) -> Table:
     if not isinstance(source, (str, Path)):
         raise ValueError(f"forcing: a file, a DataFrame or a Dataset is allowed, got {type(source).__name__}")
     path = Path(source)
-    if not path.is_file():
+    if not os.path.isfile(path):  # of a name too long for the file system, too
         raise ValueError(f"forcing: there is no file {path}")
     if path.suffix.lower() in (".nc", ".nc4", ".netcdf"):
         from sim.io.dataset import import_xarray
@@ -138,21 +139,25 @@ def _csv(path: Path) -> Table:
 
     def read(names: list[str]) -> pd.DataFrame:
         # times stay text; a row of nothing is a row, so that lines can be counted
-        table = pd.read_csv(
-            path,
-            sep=separator,
-            skiprows=comments + 1 + below,
-            header=None,
-            names=columns,
-            usecols=names,
-            index_col=False,
-            skip_blank_lines=False,
-            na_values=["NAN"],  # as Campbell's loggers write it
-            dtype={name: str for name in names if _is_time(name)},
-            low_memory=False,
-            compression="gzip" if is_packed(path) else None,
-            encoding="utf-8-sig",
-        )
+        try:
+            table = pd.read_csv(
+                path,
+                sep=separator,
+                skiprows=comments + 1 + below,
+                header=None,
+                names=columns,
+                usecols=names,
+                index_col=False,
+                skip_blank_lines=False,
+                na_values=["NAN"],  # as Campbell's loggers write it
+                dtype={name: str for name in names if _is_time(name)},
+                low_memory=False,
+                compression="gzip" if is_packed(path) else None,
+                encoding="utf-8-sig",
+            )
+        except pd.errors.ParserError as error:
+            fields = f"fields for the header's {len(columns)} names are needed in its rows"
+            raise ValueError(f"forcing: {path.name}: {fields} ({' '.join(str(error).split())})") from error
         empty = table.isna().all(axis=1).to_numpy()
         return table.iloc[: len(table) - int(np.argmin(empty[::-1])) if len(table) and not empty.all() else 0]
 
