@@ -31,6 +31,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
+from sim.draws import streams_of
 
 YEARS = 50
 CHUNK = 128  # stands in lockstep
@@ -121,11 +122,7 @@ def branch(state: dict, rows, seeds) -> sim.Stands:
     """Stands that go on from rows of a `sim.Stands.get_state`, each with its own dice from here on."""
     stands = sim.Stands(len(rows))
     chosen = {name: state[name][rows] for name in ("parameters", "state", "record", "years")}
-    generators = {
-        name: [np.random.default_rng(getattr(one, name)).bit_generator.state for one in seeds]
-        for name in ("weather", "disturbance")
-    }
-    stands.set_state({**chosen, **generators, "seeds": seeds})
+    stands.set_state({**chosen, "streams": np.array([streams_of(one) for one in seeds]), "seeds": seeds})
     return stands
 
 

@@ -67,7 +67,8 @@ class Block(gym.Env):
     def set_state(self, states: Sequence[dict]) -> None:
         """Continue from `get_state`."""
         episodes = one_below_another([state["episodes"] for state in states])
-        self.envs.set_state({"episodes": episodes, "generators": [state["generator"] for state in states]})
+        generators = [state["generator"] for state in states]
+        self.envs.set_state({"episodes": episodes, "generators": generators, "group_size": self.envs.group_size})
 
     def _filled(self, values: np.ndarray) -> np.ndarray:
         """Values of each environment, and zeros for the rows that are left over."""
