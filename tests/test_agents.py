@@ -169,6 +169,8 @@ def test_a_mask_is_of_truth_values():
         {"run": {"script": "ppo_group", "arguments": {}}},
         {"run": {"script": "ppo_group", "arguments": None}},
         {"run": {"script": "ppo_group", "arguments": {"env_id": "boreal-generalist-v0", "eval_weights": []}}},
+        {"run": {"script": "ppo_group", "arguments": {"env_id": "boreal-generalist-v0", "preference": "zzz"}}},
+        {"run": {"script": "ppo_group", "arguments": {"env_id": "boreal-generalist-v0", "preference": 7}}},
     ],
     ids=str,
 )
@@ -177,6 +179,12 @@ def test_a_file_that_no_script_has_written_is_named(damage, tmp_path):
     torch.save({**saved, **damage}, tmp_path / "policy.pt")
     with pytest.raises(ValueError, match="policy.pt: no policy that a script of this project has written"):
         protocol.load_policy(tmp_path / "policy.pt")
+
+
+@pytest.mark.parametrize("script", [5, ""])
+def test_what_is_no_path_of_a_script_is_refused(script):
+    with pytest.raises(ValueError, match=f"^script {script!r}: the path of one is allowed$"):
+        protocol.load_policy("ppo_group", script=script)
 
 
 def test_a_policy_is_not_saved_without_the_arguments_that_make_it():

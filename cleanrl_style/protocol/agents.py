@@ -3,6 +3,7 @@
 import importlib
 import importlib.util
 import json
+import os
 import pickle
 import sys
 import zipfile
@@ -14,7 +15,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 from gymnasium.spaces import Box, Discrete
 
-from cleanrl_style.flags import policy_file
+from cleanrl_style.flags import flat, policy_file
 from cleanrl_style.protocol.arguments import make_task
 from cleanrl_style.protocol.evaluation import choose_actions
 from cleanrl_style.protocol.task import Task
@@ -102,6 +103,8 @@ def load_policy(run_or_name, script=None) -> Policy:
     policy, or not the script, and ValueError if the script's network is another one by now.
     """
     path = policy_file(run_or_name)
+    if not isinstance(script, (str, os.PathLike, type(None))) or script == "":
+        raise ValueError(f"script {script!r}: the path of one is allowed")
     try:
         import torch
     except ModuleNotFoundError as error:
@@ -182,6 +185,8 @@ def _check_run(saved: dict, run: dict) -> None:
         raise TypeError("no policy")
     if not isinstance(run["script"], str) or not isinstance(run["arguments"]["env_id"], str) or not len(weights):
         raise TypeError("no run")
+    if not all(0 <= weight <= 1 for weight in flat(run["arguments"].get("preference"))):
+        raise ValueError("no preference")
 
 
 def _objectives(arguments: dict) -> int:
