@@ -86,7 +86,8 @@ def shares() -> str:
 
 def scaling() -> str:
     """How speed grows with stands and cores, and what a region costs: of each machine that was measured."""
-    return "\n".join(of_machine(pd.read_csv(path)) for path in sorted(paths.results().glob("scaling*.csv")))
+    measured = sorted(paths.results().glob("scaling*.csv"))
+    return "\n".join(of_machine(pd.read_csv(path)) for path in measured) or "Not measured yet.\n"
 
 
 def of_machine(table: pd.DataFrame) -> str:
