@@ -134,6 +134,8 @@ def parse(arguments: type):
     if "" in sys.argv[1:]:
         before = sys.argv[sys.argv.index("", 1) - 1]
         fail(f"{before + ' ' if before.startswith('--') else ''}'': a value is allowed, not an empty text")
+    if home := next((word for word in sys.argv[1:] if word.rpartition("=")[2].split("/")[0] == "~"), None):
+        fail(f"{home}: the shell left the ~ as it is; $HOME is understood everywhere")
     require("tyro", "matplotlib", "moocore", *(["torch"] if hasattr(arguments, "total_timesteps") else []))
     import tyro
 
