@@ -260,7 +260,9 @@ def budgets(seeds) -> list[Job]:
         (10, {"total_timesteps": 1_000_000, "env_id": BALANCED}),
     )
     return [
-        trained("budgets", "ppo_group", seed, **change) for number, change in changes for seed in seeds_of(number, seeds)
+        trained("budgets", "ppo_group", seed, **change)
+        for number, change in changes
+        for seed in seeds_of(number, seeds)
     ]
 
 

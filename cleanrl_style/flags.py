@@ -32,6 +32,8 @@ PARSING = re.compile(
 )
 #: What it says of them where there may be any number.
 SEVERAL = re.compile(r"Error parsing (--\S+): Could not find valid parse for arguments: \[(.*)\]\.?")
+#: What it says of a value that is none of a few, in an order of its own where None is one of them.
+CHOICE = re.compile(r"invalid choice '(.*)' for argument '(--\S+)'\. Expected one of \((.*)\)\.")
 #: Closed interval of each argument that has one; an algorithm's own are the `limits` of its arguments.
 LIMITS = {
     "seed": (0, FIRST_EVALUATION_SEED // MAX_ENVS - 1),
@@ -171,6 +173,9 @@ def in_plain_words(message: str) -> str:
     """What tyro says of a value that is not of its flag's type, without the names of types."""
     if several := SEVERAL.fullmatch(message):
         return f"{several[1]} {words_of(several[2])}: not of the kind that --help shows"
+    if choice := CHOICE.fullmatch(message):
+        allowed = sorted({*words_of(choice[3]).split()} - {"None"})
+        return f"{choice[2]} {choice[1]}: {', '.join(allowed)} are allowed"
     found = PARSING.fullmatch(message)
     if not found:
         return message

@@ -108,6 +108,7 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
             ["--run-dir", f"{__file__}/run"],
             rf"--run-dir {__file__}/run: cannot write there \(not a folder: {__file__}\)",
         ),
+        (["--mode", "x"], "--mode x: generalist, site-specific are allowed"),
         (["--run-dir=~/run"], r"--run-dir=~/run: the shell left the ~ as it is; \$HOME is understood everywhere"),
     ],
 )
