@@ -80,8 +80,8 @@ INTRODUCTION = """# Validation
 Written by `python analysis/validate.py`; every number is from that run. Observations, with their sources and licences,
 are in [analysis/observations](../analysis/observations/README.md), equations in [model.md](model.md). Bias is modelled
 less measured, RMSE the root mean square error, r Pearson's correlation. **MISS** is a value outside the band or beyond
-the tolerance that the part states; all of them are listed at the end. Constants that were calibrated say so
-in [sim/constants.csv](../sim/constants.csv); no other was changed to remove a miss."""
+the tolerance that the part states; all of them are listed at the end. Constants that were calibrated to
+observations, some of them to those below, have the mark [C] in [model.md](model.md)."""
 
 
 def assemble(parts: dict[str, Part]) -> str:

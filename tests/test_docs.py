@@ -92,6 +92,14 @@ def test_every_file_of_data_has_a_licence():
     assert tables and [name for name in tables if name not in licences] == []
 
 
+def test_decisions_keep_their_numbers_where_they_are_rendered():
+    # a list goes on from its first number, whatever the others are
+    parts = re.split(r"^(?:##|<!--) .*$", (ROOT / "docs" / "decisions.md").read_text(), flags=re.MULTILINE)
+    lists = [[int(number) for number in re.findall(r"^(\d+)\. \*\*", part, flags=re.MULTILINE)] for part in parts]
+    assert all(numbers == list(range(numbers[0], numbers[0] + len(numbers))) for numbers in lists if numbers)
+    assert sorted(sum(lists, [])) == [*range(1, 55), *range(60, 77), *range(80, 112)]
+
+
 def test_what_follow_readme_does_is_what_the_readme_says():
     lines = follow_readme.commands(TEXTS[ROOT / "README.md"])
     assert lines[0].startswith(follow_readme.CLONE)

@@ -69,7 +69,7 @@ def observation_entries(evidence):
     "The sampling ranges of the site's parameters are listed comprehensively.",
     "Table of sampling ranges",
     PAPER_ALONE,
-    note="The ranges that it does not list are ours, with their sources in `sim/site_parameters.csv`.",
+    note="The ranges that it does not list are those of its published code.",
     kind=IMPLEMENTATION,
 )
 def listed_parameters(evidence):
