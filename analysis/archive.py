@@ -6,6 +6,7 @@ A run's folder there has its config.json as it is, tables.zip with the tables th
 of the runs of the main table, on either task, policy.pt: the agent, which `cleanrl_style.protocol.load_policy` loads.
 """
 
+import io
 import shutil
 import sys
 import zipfile
@@ -30,13 +31,15 @@ class Args:
     """folder of the archive"""
 
 
-def write_tables(path: Path, run: runs.Run) -> None:
-    """A run's tables as a zip without times in it, whole or not at all."""
-    with protocol.replacing(path) as file, zipfile.ZipFile(file, "w") as packed:
+def tables_of(run: runs.Run) -> bytes:
+    """A run's tables as a zip without times in it."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as packed:
         for name, table in run.tables.items():
             member = zipfile.ZipInfo(f"{name}.csv")  # of 1980, wherever and whenever it is written
             member.create_system = 0
             packed.writestr(member, reduction.as_text(name, table), zipfile.ZIP_DEFLATED, compresslevel=9)
+    return file.getvalue()
 
 
 def folder_of(config: dict, archive_dir: Path) -> Path:
@@ -46,24 +49,14 @@ def folder_of(config: dict, archive_dir: Path) -> Path:
     return archive_dir / config["script"] / folder_name(arguments["env_id"], changed) / f"seed{arguments['seed']}"
 
 
-def is_whole(path: Path) -> bool:
-    """Whether it is a zip whose members are as they were written."""
-    if not zipfile.is_zipfile(path):
-        return False
-    with zipfile.ZipFile(path) as packed:
-        return packed.testzip() is None
-
-
 def archive_run(run: runs.Run, archive_dir: Path, jobs: list[experiments.Job]) -> bool:
-    """Archive a run, its policy if a job of the main table made it; False if the archive has it, of the same
-    commit.
-    """
-    folder, config = folder_of(run.config, archive_dir), (run.folder / "config.json").read_bytes()
-    policy = run.folder / POLICY
+    """Archive a run, its policy if a job of the main table made it; False if the archive has the same bytes."""
+    folder, policy = folder_of(run.config, archive_dir), run.folder / POLICY
     keeps_policy = policy.exists() and any(job.experiment in MAIN and job.made(run.config) for job in jobs)
-    kept = {"config.json": config} | ({POLICY: policy.read_bytes()} if keeps_policy else {})
-    there = {name: (folder / name).read_bytes() for name in kept if (folder / name).exists()}
-    if there == kept and is_whole(folder / runs.ARCHIVED):
+    kept = {"config.json": (run.folder / "config.json").read_bytes()}
+    kept |= {POLICY: policy.read_bytes()} if keeps_policy else {}
+    kept[runs.ARCHIVED] = tables_of(run)  # last: it declares the run finished
+    if kept == {name: (folder / name).read_bytes() for name in kept if (folder / name).exists()}:
         return False
     if folder.exists():
         shutil.rmtree(folder)
@@ -71,7 +64,6 @@ def archive_run(run: runs.Run, archive_dir: Path, jobs: list[experiments.Job]) -
     for name, content in kept.items():
         with protocol.replacing(folder / name) as file:
             file.write(content)
-    write_tables(folder / runs.ARCHIVED, run)  # last: it declares the run finished
     return True
 
 

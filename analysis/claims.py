@@ -238,7 +238,7 @@ def folder_of(args: Args) -> Path:
 
 def main(args: Args) -> None:
     """Write the document; print how many claims have which verdict."""
-    results = Results.load(args.quick, args.runs_dir or (paths.archive(args.quick),))
+    results = Results.load(args.quick, args.runs_dir or (paths.there(paths.archive(args.quick)),))
     text, counts = document(results)
     path = args.output or folder_of(args) / "reproduction.md"
     try:

@@ -13,6 +13,7 @@ from analysis.methods import LEARNERS, METHODS, OUTSIDE, STRATEGIES
 from analysis.runs import SITE_SPECIFIC, setting
 from boreal_env import REGISTERED
 from cleanrl_style.protocol.arguments import DEFAULT_STEPS
+from cleanrl_style.protocol.run_folder import as_text
 
 ROOT = Path(__file__).parents[1]
 GENERALIST, BALANCED, ONE_SITE = "boreal-generalist-v0", "boreal-balanced-v0", "boreal-site-specific-v0"
@@ -108,7 +109,7 @@ class Job:
             config["script"] == self.script
             and arguments["env_id"] == self.env_id
             and all(
-                arguments.get(name) == (list(value) if isinstance(value, tuple) else value)
+                as_text(arguments.get(name)) == as_text(value)
                 for name, value in self.flags.items()
                 if name not in OUTPUT
             )
@@ -145,7 +146,7 @@ def balanced(seeds) -> list[Job]:
 
 
 def group(seeds) -> list[Job]:
-    """Group PPO with one choice changed, and gated PPO at its control: without groups it is PPO with whole episodes."""
+    """Group PPO with one choice changed; with groups of one it is PPO with whole episodes."""
     changes = (
         {"group_size": 1},
         {"group_size": 2},
@@ -317,7 +318,9 @@ QUICK_EVALUATION = {"eval_episodes": 2, "eval_weights": (0.0, 0.5, 1.0)}
 def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path | None = None) -> list[Job]:
     """Every script of every experiment, in seconds: one seed, the first of its settings, the outer weights."""
     small, seen = [], set()
-    for number, job in enumerate(jobs(only, [1])):
+    for number, job in enumerate(jobs(seeds=[1])):  # numbered the same whatever is asked for
+        if job.experiment not in only:
+            continue
         flags = dict(job.flags)
         kind = job.experiment, job.script, flags.get("preference")
         if kind in seen or flags.get("preference", 0.0) not in (0.0, 1.0):

@@ -112,8 +112,8 @@ def main(args: Args) -> None:
         print(f"left out: {line}", file=sys.stderr)
     others = finished.of_another_physics(results.runs)
     if others:
-        of = f"{len(others)} of {len(results.runs)} runs were made with another source of the simulator than this"
-        print(f"{of}, such as {others[0].folder}; --overwrite makes a run anew", file=sys.stderr)
+        of = f"{len(others)} of {len(results.runs)} runs were made with another source of the simulator, or do not say"
+        print(f"{of} with which, such as {others[0].folder}; --overwrite makes a run anew", file=sys.stderr)
     if not results.runs:
         where, first = ", ".join(map(str, results.roots)), next(job.command for job in results.missing if job.exists)
         protocol.fail(f"no finished run under {where}; `{first}` makes the first, `python analysis/reproduce.py` all")

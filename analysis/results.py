@@ -11,6 +11,7 @@ from analysis import experiments, methods, metrics, paths, reduction, runs, stor
 from analysis.studies.constant_plans import of_environment
 from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
+from cleanrl_style.protocol.run_folder import as_text
 
 PAIR = ["carbon", "thaw"]  # the paper's objectives
 
@@ -131,7 +132,7 @@ class Results:
             site = "" if site_seed is None else f", site seed {site_seed}"
             self.left_out.append(
                 f"{key[0]}, {key[1]}, seed {seed}{site}: partial, without the agents of the weights "
-                f"{', '.join(map(runs.as_text, sorted(lacking)))}"
+                f"{', '.join(map(as_text, sorted(lacking)))}"
             )
         return not lacking
 

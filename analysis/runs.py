@@ -15,6 +15,7 @@ import pandas as pd
 from analysis import paths, reduction
 from cleanrl_style.protocol import files, fronts
 from cleanrl_style.protocol.reference import physics_name
+from cleanrl_style.protocol.run_folder import as_text
 
 SITE_SPECIFIC = "site-specific"  # the mode in which all episodes are of one site and weather
 ARCHIVED = "tables.zip"  # the reduced tables of an archived run
@@ -92,14 +93,12 @@ def setting(not_default: dict, mode: str) -> str:
     return ", ".join(f"{name}={as_text(value)}" for name, value in sorted(items.items())) or "default"
 
 
-def as_text(value) -> str:
-    """An argument as rows and folders name it."""
-    return ",".join(f"{v:g}" for v in np.ravel(value)) if isinstance(value, (list, tuple)) else str(value)
-
-
 def identity(config: dict) -> str:
-    """The same for two folders exactly if they hold the same run."""
-    return json.dumps([config["script"], config["arguments"]], sort_keys=True)
+    """The same for two folders exactly if they hold the same run: arguments may have come or gone since, with what is
+    now the default."""
+    arguments, changed = config["arguments"], dict(config["not_default"])
+    named = {name: arguments.get(name) for name in ("env_id", "mode", "seed", "site_seed", "preference")}
+    return json.dumps([config["script"], changed | named], sort_keys=True)
 
 
 def is_finished(folder: Path) -> bool:
@@ -232,8 +231,8 @@ def check_training(tables: dict[str, pd.DataFrame], arguments: dict) -> None:
 
 
 def of_another_physics(runs: list[Run]) -> list[Run]:
-    """Those that another simulator or environment than this checkout's has made; older runs do not say which."""
-    return [run for run in runs if run.config.get("physics", physics_name()) != physics_name()]
+    """Those that another simulator or environment than this checkout's has made, or that do not say which."""
+    return [run for run in runs if not is_of_this_physics(run)]
 
 
 def run_folders(root: Path, *files: str) -> list[Path]:

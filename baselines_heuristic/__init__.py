@@ -50,7 +50,9 @@ def obeying(policy):
 
 
 def main(script: str, policy) -> None:
-    """Evaluate `policy`, a function of observations (n, d) and masks (n, 25), as the script of that name.
+    """Evaluate `policy`, a function of observations (n, d) and masks (n, 25), as a script.
+
+    script : its file, `__file__`.
 
     It does not look at the preference: its episodes are the same under every weight, and are simulated once. None has
     another policy when greedy: random actions stay random.

@@ -240,11 +240,15 @@ if __name__ == "__main__":
 
         names = task.make().unwrapped.observation_names
         wanted = ("year",) if args.genome == "plan" else INPUTS
+        lacking = [name for name in wanted if name not in names and not name.startswith("site_")]
+        if lacking or len(names) != envs.single_observation_space.shape[0]:
+            what = lacking[0] if lacking else "entries by name, and a wrapper changes what is observed"
+            protocol.fail(f"--env-id {args.env_id}: candidates look at {what}")
         inputs = [names.index(name) for name in wanted if name in names]
         blocks = -(-task.years // args.block_years) if args.genome == "plan" else 0
         shape = {"inputs": inputs, "num_blocks": blocks, "block_years": args.block_years}
         agent = Agent(envs, **shape, num_candidates=args.population, num_objectives=task.num_objectives)
-        generator = np.random.default_rng(args.seed)
+        generator = np.random.default_rng([args.seed, 1])  # another stream than the algorithm's
         first = first_candidates(args.genome, args.population, agent.num_features, generator)
         algorithm = make_algorithm(args, first, task.num_objectives)
 

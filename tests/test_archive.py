@@ -17,7 +17,17 @@ def files_of(folder):
 def test_runs_of_another_physics_are_found():
     made = {"old": {}, "here": {"physics": physics_name()}, "elsewhere": {"physics": "0123456789abcdef"}}
     others = runs.of_another_physics([runs.Run(Path(name), config, {}) for name, config in made.items()])
-    assert [str(run.folder) for run in others] == ["elsewhere"]
+    assert [str(run.folder) for run in others] == ["old", "elsewhere"]  # the first does not say
+
+
+def test_a_run_of_a_script_that_lost_an_argument_since_is_the_same_run(tmp_path):
+    for root in ("archive", "runs"):
+        write_run(tmp_path / root / "one", "ppo_group", vectorization="lockstep")
+    config = tmp_path / "archive" / "one" / "config.json"
+    text = config.read_text(encoding="utf-8").replace('"mode"', '"scalarization": "linear", "mode"')
+    config.write_text(text, encoding="utf-8")
+    found, left_out = runs.read_runs(tmp_path / "archive", tmp_path / "runs")
+    assert [run.folder.parent.name for run in found] == ["archive"] and not left_out
 
 
 @pytest.fixture
@@ -70,6 +80,16 @@ def test_only_what_is_new_is_written(archived, capsys):
     archive.archive(TINY_RUNS, archived)
     assert {path: path.stat().st_mtime_ns for path in archived.rglob("*")} == before
     assert "0 runs new of 2" in capsys.readouterr().out
+
+
+def test_tables_of_another_evaluation_are_written(tmp_path):
+    write_run(tmp_path / "runs" / "one", "ppo_gated")
+    archive.archive(tmp_path / "runs", tmp_path / "archive")
+    table = tmp_path / "runs" / "one" / "evaluation.csv"
+    pd.read_csv(table).assign(thaw_return=7.0).to_csv(table, index=False)
+    archive.archive(tmp_path / "runs", tmp_path / "archive")
+    (run,), _ = runs.read_runs(tmp_path / "archive")
+    assert (run.tables["evaluation"].thaw_return == 7.0).all()
 
 
 def test_an_archive_that_was_stopped_is_completed(archived):

@@ -12,7 +12,7 @@ from tiny_runs import TINY_RUNS
 import sim
 from analysis import generalisation, paths, stored
 from cleanrl_style import protocol
-from cleanrl_style.protocol import sites
+from cleanrl_style.protocol import reference, sites
 from sim.task.episodes import BALANCED_WORLD
 from sim.task.shifts import INSIDE, SHIFTS, shifted, shifts_of
 
@@ -145,6 +145,7 @@ def run(tmp_path, monkeypatch):
     arguments = {"env_id": "boreal-balanced-v0", "mode": "generalist", "seed": 1, "site_seed": None}
     arguments |= {"eval_weights": WEIGHTS, "eval_episodes": 2, "thaw_formulation": "asymmetric"}
     config = {"script": "plus_100", "arguments": arguments, "not_default": {}, "primary_policy": "greedy"}
+    config["physics"] = reference.physics_name()
     (folder / "config.json").write_text(json.dumps(config))
     episodes(2.0).to_csv(folder / "evaluation.csv", index=False)
     shutil.copy(TINY_RUNS / "zero_change" / "timing.csv", folder)

@@ -353,9 +353,10 @@ def test_of_two_that_differ_the_run_of_this_physics_counts(tmp_path, capsys):
     for name, carbon in (("archive", (0, 1, 2)), ("runs", (3, 4, 5))):
         write_run(tmp_path / name / "run", "ppo_curriculum", carbon=carbon, vectorization="lockstep")
     roots = (tmp_path / "archive", tmp_path / "runs")
+    archived, again = (root / "run" / "config.json" for root in roots)
+    archived.write_text(json.dumps({**json.loads(archived.read_text()), "physics": None}))
     for physics, counts, other in ((None, *roots), (physics_name(), *roots[::-1])):
-        config = roots[1] / "run" / "config.json"
-        config.write_text(json.dumps({**json.loads(config.read_text()), "physics": physics}))
+        again.write_text(json.dumps({**json.loads(again.read_text()), "physics": physics}))
         make_tables.main(make_tables.Args(runs_dir=roots, tables_dir=tmp_path / "t"))
         row = read(tmp_path / "t", "main_results", ["method", "environment", "setting"]).loc[MAIN]
         assert row.seeds == 1 and row.scalarized == pytest.approx((5 if counts == roots[0] else 5 + 4.5) / 3)

@@ -107,6 +107,9 @@ def test_quick_has_every_kind_of_job():
     assert {(job.experiment, job.script) for job in quick} == {(job.experiment, job.script) for job in full}
     assert all(job.steps <= 2 * experiments.QUICK_STEPS for job in quick)
     assert len({job.command for job in quick}) == len(quick)
+    # a folder is of the same run, whatever is asked for
+    alone = [job for name in COUNTS for job in experiments.quick_jobs((name,))]
+    assert [job.command for job in alone] == [job.command for job in quick]
 
 
 def test_list_prints_the_commands(capsys):

@@ -3,6 +3,7 @@
 import sys
 import tokenize
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -114,6 +115,19 @@ def test_that_nothing_was_learnt_is_said_of_returns_as_they_ship(capsys, monkeyp
     for gain, said in ((0.0, 1), (0.01, 0)):
         summary.print_score(PAIR, compare(greedy=((gain,) * 3, (gain,) * 3)))
         assert capsys.readouterr().out.count("it has learnt nothing yet") == said
+
+
+def test_a_run_that_starts_over_is_another_of_weights_and_biases(tmp_path, monkeypatch):
+    asked = []
+    wandb = SimpleNamespace(
+        init=lambda **kwargs: asked.append(kwargs["id"]), errors=SimpleNamespace(UsageError=OSError)
+    )
+    monkeypatch.setitem(sys.modules, "wandb", wandb)
+    args = SimpleNamespace(track=("wandb",), wandb_project_name="p", env_id="e", seed=1)
+    for folder in ("run", "run", "other"):
+        (tmp_path / folder).mkdir(exist_ok=True)
+        tracking.start(args, "script", tmp_path / folder, {}, 0)
+    assert asked[0] == asked[1] != asked[2]
 
 
 def test_a_tracker_has_a_curve_for_each_weight():

@@ -27,6 +27,27 @@ def test_a_time_limit_has_no_state_to_go_on_from():
     assert states[0] is None and states[1] is not None
 
 
+class WithLuck(gym.ObservationWrapper):
+    """An entry more, behind the preference."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        low, high = (np.insert(bound, 1, bound[1]) for bound in (env.observation_space.low, env.observation_space.high))
+        self.observation_space = gym.spaces.Box(low, high, dtype=np.float32)
+
+    def observation(self, observation):
+        return np.insert(observation, 1, 0.5).astype(np.float32)
+
+
+def test_names_of_entries_that_a_wrapper_moved_are_not_believed(tmp_path):
+    gym.register("lucky-v0", entry_point=lambda **kwargs: WithLuck(boreal_env.BorealEnv(**kwargs)))
+    assert not protocol.Task.of("lucky-v0").site_entries
+    pytest.importorskip("pymoo")
+    given = ("--env-id", "lucky-v0", "--vectorization", "async", "--run-dir", tmp_path / "run")
+    with pytest.raises(SystemExit, match="--env-id lucky-v0: candidates look at entries by name"):
+        run_script("cleanrl_style/moea.py", *given)
+
+
 def test_returns_that_are_not_finite_are_no_row():
     task = protocol.Task("sites-v0", {}, ("carbon", "thaw"))
     with pytest.raises(FloatingPointError, match="sites-v0: an episode's returns are .*nan"):

@@ -18,6 +18,7 @@ from gymnasium.spaces import Box, Discrete
 from cleanrl_style.flags import flat, policy_file
 from cleanrl_style.protocol.arguments import make_task
 from cleanrl_style.protocol.evaluation import choose_actions
+from cleanrl_style.protocol.files import load_whole
 from cleanrl_style.protocol.task import Task
 
 
@@ -111,11 +112,7 @@ def load_policy(run_or_name, script=None) -> Policy:
         raise ModuleNotFoundError('load_policy needs torch: pip install -e ".[train]"', name="torch") from error
 
     try:
-        with zipfile.ZipFile(path) as archive:
-            damaged = archive.testzip()  # torch does not look at the checksums that it wrote
-        if damaged:
-            raise ValueError(f"damaged: {damaged}")
-        saved = torch.load(path, weights_only=True)
+        saved = load_whole(path, weights_only=True)
         run = saved.get("run") or json.loads((path.parent / "config.json").read_text(encoding="utf-8"))
         _check_run(saved, run)
     except (
@@ -139,7 +136,8 @@ def load_policy(run_or_name, script=None) -> Policy:
     if lacking:
         raise ValueError(f"{module.__file__}: it has no {' and no '.join(lacking)}, so it trained no policy")
     try:
-        agent = module.Agent(envs, **saved["arguments"])
+        with torch.random.fork_rng(devices=[]):  # its first weights are drawn and thrown away
+            agent = module.Agent(envs, **saved["arguments"])
         # a policy that ships is without its critic, which chooses nothing
         critic = {name: value for name, value in agent.state_dict().items() if name.startswith("critic.")}
         agent.load_state_dict({**critic, **saved["agent"]})

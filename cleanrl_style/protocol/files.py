@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import zipfile
 from pathlib import Path
 
 
@@ -17,6 +18,17 @@ def replacing(path: Path):
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def load_whole(path: Path, weights_only: bool):
+    """What torch has saved in a file. zipfile.BadZipFile for one that is not as it was written; what torch raises."""
+    import torch  # only here: the heuristics do without
+
+    with zipfile.ZipFile(path) as archive:
+        damaged = archive.testzip()  # torch does not look at the checksums that it wrote
+    if damaged:
+        raise zipfile.BadZipFile(f"damaged: {damaged}")
+    return torch.load(path, weights_only=weights_only)
 
 
 def is_cut(table: Path) -> bool:

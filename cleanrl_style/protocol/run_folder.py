@@ -31,7 +31,7 @@ from cleanrl_style.protocol import tracking, training_envs
 from cleanrl_style.protocol.arguments import FREE_ARGUMENTS, not_default
 from cleanrl_style.protocol.course import Course
 from cleanrl_style.protocol.evaluation import PRIMARY, episodes_by_policy, lanes_of_evaluation
-from cleanrl_style.protocol.files import is_cut, replacing
+from cleanrl_style.protocol.files import is_cut, load_whole, replacing
 from cleanrl_style.protocol.fronts import objectives_of, weight_columns
 from cleanrl_style.protocol.progress import Progress
 from cleanrl_style.protocol.reference import physics_name, reference_returns
@@ -153,8 +153,11 @@ class Run:
     def _claim_folder(self) -> None:
         """Make the folder this run's, and lock it by its timing.csv; what is there of this very run stays."""
         config_file, timing_file = self.folder / "config.json", self.folder / "timing.csv"
-        # a file that a killed process left half-written does not make the folder another's
-        occupied = self.folder.is_dir() and any(not path.name.endswith(".tmp") for path in self.folder.iterdir())
+        # what a killed process left half-written, or empty, does not make the folder another's
+        occupied = self.folder.is_dir() and any(
+            not path.name.endswith(".tmp") and not (path == timing_file and not path.stat().st_size)
+            for path in self.folder.iterdir()
+        )
         if occupied and not config_file.exists():
             fail(f"--run-dir {self.folder}: neither empty nor a run's folder (it has no config.json)")
         if occupied and is_foreign(config_file):
@@ -162,8 +165,6 @@ class Run:
         if occupied and not self.args.overwrite:
             self._compare(config_file)
         self.folder.mkdir(parents=True, exist_ok=True)
-        if not occupied:
-            self._write_config()
         timing_file.touch()
         self.lock = open(timing_file, "r+b")
         if fcntl is not None:
@@ -175,6 +176,7 @@ class Run:
             for name in (*RESULTS, *tracking.FOLDERS):
                 remove(self.folder / name)
             self.lock.truncate()
+        if not occupied or self.args.overwrite:
             self._write_config()
         # timing.csv keeps its rows; the time that this run took goes on from the last whole one
         *rows, half_a_row = self.lock.read().split(b"\n")
@@ -252,12 +254,8 @@ class Run:
         path = self.folder / "checkpoint.pt"
         if not path.exists():
             return
-        import torch
-
         try:
-            with zipfile.ZipFile(path) as archive:
-                damaged = archive.testzip()  # torch does not look at the checksums that it wrote
-            checkpoint = None if damaged else torch.load(path, weights_only=False)
+            checkpoint = load_whole(path, weights_only=False)
         except (
             zipfile.BadZipFile,
             RuntimeError,
@@ -266,9 +264,7 @@ class Run:
             ImportError,
             AttributeError,
         ) as error:
-            damaged = str(error).splitlines()[0]
-        if damaged:
-            fail(f"{path} is damaged ({damaged}); --overwrite starts over")
+            fail(f"{path} is damaged ({str(error).splitlines()[0]}); --overwrite starts over")
         steps = getattr(self.args, "total_timesteps", 0)
         if (
             not isinstance(checkpoint, dict)
@@ -549,17 +545,19 @@ def differences(there: dict, here: dict) -> str:
 def folder_name(env_id: str, changed: dict) -> str:
     """Environment and name=value of what is not default; the end of a name too long for file systems is its hash."""
 
-    def shown(value) -> str:
-        if not isinstance(value, tuple):
-            return str(value)
-        return ",".join(f"{one:g}" if isinstance(one, (int, float)) else str(one) for one in np.ravel(value).tolist())
-
-    name = "-".join([env_id.split(":")[-1], *(f"{k}={shown(value)}" for k, value in changed.items())])
+    name = "-".join([env_id.split(":")[-1], *(f"{k}={as_text(value)}" for k, value in changed.items())])
     name = re.sub(r"[/\\\s]+", "-", name)  # one folder
     if len(name.encode()) <= LONGEST_NAME:
         return name
     digest = hashlib.sha256(name.encode()).hexdigest()[:12]
     return f"{name.encode()[: LONGEST_NAME - 13].decode(errors='ignore')}-{digest}"
+
+
+def as_text(value) -> str:
+    """An argument as folders and tables name it."""
+    if not isinstance(value, (list, tuple)):
+        return str(value)
+    return ",".join(f"{one:g}" if isinstance(one, (int, float)) else str(one) for one in np.ravel(value).tolist())
 
 
 def versions() -> dict:

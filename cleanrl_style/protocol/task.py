@@ -48,9 +48,9 @@ class Task:
         env = gym.make(env_id, disable_env_checker=True, **env_kwargs)
         one = env.unwrapped
         objectives = _check_spaces(env)
-        names = getattr(one, "observation_names", ())
-        if len(env.observation_space.low) == len(boreal_env.OBSERVATION_NAMES):
-            names = names or boreal_env.OBSERVATION_NAMES  # laid out like ours, so its last entries are a site
+        names, width = getattr(one, "observation_names", ()), len(env.observation_space.low)
+        if len(names) != width:  # a wrapper's, or another's; laid out like ours, its last entries are a site
+            names = boreal_env.OBSERVATION_NAMES if width == len(boreal_env.OBSERVATION_NAMES) else ()
         bare = type(env.env if isinstance(env, OrderEnforcing) else env) is boreal_env.BorealEnv
         task = Task(
             env_id=env_id,

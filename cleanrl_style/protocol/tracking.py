@@ -1,5 +1,7 @@
 """TensorBoard and Weights & Biases, for those who ask for them by --track: the run's tables, row by row."""
 
+import atexit
+import secrets
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +35,9 @@ def tensorboard(args, script, folder, config, first_step):
     """Event files in <run>/tensorboard."""
     from torch.utils.tensorboard import SummaryWriter
 
-    writer = SummaryWriter(str(folder / "tensorboard"), purge_step=first_step + 1 if first_step else None)
+    purged = first_step + 1 if first_step else None
+    writer = SummaryWriter(str(folder / "tensorboard"), purge_step=purged, flush_secs=1)  # what a kill may lose
+    atexit.register(writer.close)  # its thread ends with the program, and with it what is not yet written
 
     def track(table: str, row: dict) -> None:
         for name, value in numbers(table, row).items():
@@ -44,18 +48,19 @@ def tensorboard(args, script, folder, config, first_step):
 
 def wandb(args, script, folder, config, first_step):
     """A run of the project args.wandb_project_name; resumed, it goes on under the same id."""
-    import hashlib
-
     import wandb
 
-    identity = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()[:16]
+    identity = folder / "wandb" / "borearl_id"  # --overwrite takes it away: what it starts is another run
+    if not identity.exists():
+        identity.parent.mkdir(exist_ok=True)
+        identity.write_text(secrets.token_hex(8))
     try:
         wandb.init(
             project=args.wandb_project_name,
             name=f"{script}-{args.env_id}-{args.seed}",
             config=config,
             dir=str(folder),
-            id=identity,
+            id=identity.read_text(),
             resume="allow",
         )
     except wandb.errors.UsageError as error:  # no login

@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import time
 import traceback
 from functools import partial
 
@@ -161,9 +162,9 @@ def end(envs: gym.vector.VectorEnv) -> list[str]:
     if not isinstance(pool, gym.vector.AsyncVectorEnv) or pool.closed:
         return []
     blocks = envs.blocks if isinstance(envs, Streams) else split(envs.num_envs, envs.num_envs)
-    dead = []
+    dead, deadline = [], time.monotonic() + 0.1  # of all together: there may be a thousand
     for streams, process in zip(blocks, pool.processes, strict=True):
-        process.join(timeout=0.1 if not dead else 0)
+        process.join(timeout=0 if dead else max(deadline - time.monotonic(), 0))
         if process.exitcode is not None:
             cause = f"signal {-process.exitcode}" if process.exitcode < 0 else "its error above"
             worker = name_of(streams) if len(streams) == 1 else f"the worker of {name_of(streams)}"

@@ -11,6 +11,7 @@ import pandas as pd
 from cleanrl_style.protocol import EPISODE_INFO
 from cleanrl_style.protocol.evaluation import evaluation_columns
 from cleanrl_style.protocol.fronts import return_columns, weight_columns
+from cleanrl_style.protocol.reference import physics_name
 
 TINY_RUNS = Path(__file__).parent
 
@@ -66,7 +67,7 @@ def write_run(
         **({"total_timesteps": 300_000} if trains else {}),
         **not_default,
     }
-    config = {"script": script, "arguments": arguments, "not_default": not_default}
+    config = {"script": script, "arguments": arguments, "not_default": not_default, "physics": physics_name()}
     (folder / "config.json").write_text(json.dumps(config))
 
 
@@ -103,5 +104,5 @@ def write_run_of_three(folder, script, returns, seed=1, env_id="timber_env:timbe
         "eval_episodes": 2,
         **({"total_timesteps": 200} if trains else {}),
     }
-    config = {"script": script, "arguments": arguments, "not_default": {}}
+    config = {"script": script, "arguments": arguments, "not_default": {}, "physics": physics_name()}
     (folder / "config.json").write_text(json.dumps(config))
