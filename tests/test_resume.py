@@ -253,6 +253,20 @@ def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, t
     assert "was begun with numpy 1.0 there" in err and "source another there" in err and "Traceback" not in err
 
 
+def test_of_two_processes_that_start_at_once_the_second_leaves_no_configuration(tmp_path):
+    hold = (
+        "import fcntl, sys; f = open('timing.csv', 'wb'); fcntl.lockf(f, fcntl.LOCK_EX); print(1, flush=True); input()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", hold], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as first:
+        assert first.stdout.readline() == "1\n"
+        with pytest.raises(SystemExit, match="another process is at work on this run"):
+            resume(tmp_path)
+        first.communicate("\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["timing.csv"]
+
+
 def test_a_full_disk_leaves_the_old_checkpoint(interrupted, tmp_path):
     folder = copy(interrupted, tmp_path)
     old = (folder / "checkpoint.pt").read_bytes()
