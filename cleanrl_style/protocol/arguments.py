@@ -94,16 +94,16 @@ def make_task(args, *, preference=None, hide_site: bool = False) -> Task:
 def ideal_point(task: Task, given=None) -> tuple[float, ...]:
     """The point that Chebyshev's utility measures from, a return for each objective.
 
-    In each objective it is the return of the constant plan which is best in it, mean of the task's test episodes (on
-    one site, of ONE_SITE_EPISODES weathers): fixed by the task, whatever is learned. given : by the user instead.
+    In each objective it is the return of the constant plan which is best in it, mean of the task's validation episodes
+    (on one site, of ONE_SITE_EPISODES weathers): fixed by the task, whatever is learned. given : by the user instead.
     """
     names = ", ".join(task.objectives)
     if given is None and not task.boreal:
         fail(f"--ideal-point: a return for each of {names} is needed, as --env-id {task.env_id} has no constant plans")
     if given is None:
         weathers = 1 if task.mode == "site-specific" else ONE_SITE_EPISODES
-        episodes = len(published_seeds("test")) if task.draws_sites else weathers
-        plans = reference_returns(task, evaluation_seeds(task, episodes))
+        episodes = len(published_seeds("validation")) if task.draws_sites else weathers
+        plans = reference_returns(task, evaluation_seeds(task, episodes, "validation"))
         plans = plans[plans.plan.str.isdigit()]
         given = plans.groupby("plan")[return_columns(task.objectives)].mean().max().round(2)
         shown = (f"{name} {value:g}" for name, value in zip(task.objectives, given, strict=True))
