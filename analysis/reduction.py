@@ -38,6 +38,13 @@ ANNUAL = (
     "boundary_cooling_mj_m2",
     *(f"{species}_{age}_stems_ha" for species in SPECIES for age in AGE_CLASSES),
 )
+#: Columns that a run's own tables have in any case, besides weights and returns.
+NEEDED = {
+    "evaluation": ("policy", "episode"),
+    "timing": ("phase", "global_step", "seconds"),
+    "evaluation_years": ("policy", "year", "variable", "mean", "sd"),
+    "episodes": ("global_step", "env", "scalarized_return", *EPISODE_INFO),
+}
 FLOAT_FORMAT = "%.6g"
 FLOAT_FORMATS = {"timing": "%.12g", "learning": "%.12g"}  # differences of statistics need more digits
 

@@ -125,6 +125,9 @@ def read_whole(folder: Path, trained: bool) -> dict[str, pd.DataFrame]:
         if not path.exists():
             raise ValueError(f"{'unfinished' if name == 'evaluation' else 'partial'}: it has no {name}.csv")
         tables[name] = read_table(path)
+        lacking = [column for column in reduction.NEEDED.get(name, ()) if column not in tables[name]]
+        if lacking:
+            raise ValueError(f"damaged: {name}.csv lacks the column {lacking[0]}")
     return tables
 
 
@@ -184,10 +187,7 @@ def read_run(folder: Path) -> Run:
     check(tables["evaluation"], config)
     if steps is not None:
         check_training(tables, config["arguments"])
-    try:
-        return Run(folder, config, reduction.reduce(tables, steps, primary_of(config)))
-    except (AttributeError, KeyError, TypeError) as error:
-        raise ValueError(f"damaged: a table lacks a column ({in_a_line(error)})") from error
+    return Run(folder, config, reduction.reduce(tables, steps, primary_of(config)))
 
 
 def check(evaluation: pd.DataFrame, config: dict) -> None:
@@ -220,10 +220,16 @@ def check(evaluation: pd.DataFrame, config: dict) -> None:
 
 
 def check_training(tables: dict[str, pd.DataFrame], arguments: dict) -> None:
-    """ValueError if the log of a finished training ends before half of its steps: the file was cut short."""
+    """ValueError if the log of a finished training lacks a column, or ends before half of its steps: it was cut."""
     episodes, steps, years = tables["episodes"], arguments["total_timesteps"], tables.get("evaluation_years")
-    if years is None or not {"global_step", "env"} <= {*episodes} or "year" not in years:
-        return  # how long its episodes are is not known, or the lacking column is named later
+    objectives = fronts.objectives_of(tables["evaluation"].columns)
+    needed = [*fronts.weight_columns(objectives), *fronts.return_columns(objectives)]
+    needed += ["site_seed", "threshold", "score"] if "selected" in episodes else []
+    lacking = [name for name in needed if name not in episodes]
+    if lacking:
+        raise ValueError(f"damaged: episodes.csv lacks the column {lacking[0]}")
+    if years is None:
+        return  # how long its episodes are is not known
     first_end = max(arguments.get("num_envs") or 1, episodes.env.nunique()) * years.year.max()
     last = 0 if episodes.empty else episodes.global_step.max()
     if first_end <= steps and not last >= steps / 2:  # a search by generations may end with half of its steps left

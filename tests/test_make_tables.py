@@ -305,7 +305,7 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
         ("columns", "the returns of ['carbon'] lacks the column weight_carbon"),
         ("infinite", "not finite"),
         ("partial", "partial: it has no episodes.csv"),
-        ("without-any-steps", "damaged: a table lacks a column"),
+        ("without-any-steps", "damaged: episodes.csv lacks the column global_step"),
         ("text-for-numbers", "damaged: episodes.csv, line 2: global_step is 'x', not a number"),
         ("broken-years", "damaged: evaluation_years.csv"),
         ("half-a-line", "damaged: timing.csv does not end with a newline"),
