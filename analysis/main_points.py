@@ -91,19 +91,38 @@ def on_sites(replicates: list) -> pd.DataFrame:
     return pd.DataFrame([metrics.of_sites(one.by_policy["greedy"]) for one in replicates])
 
 
+def ends_of_difference(replicates: list, other: list) -> tuple[float, float]:
+    """Ends of both 95 % intervals of what one gains more: over seeds and sites, and by t over seeds.
+
+    Of a plan or a single training, which has no seeds to differ, the other's seeds alone count.
+    """
+    first, second = on_sites(replicates), on_sites(other)
+    _, low, high = metrics.difference_interval(first, second)
+    (ours, our_half), (theirs, their_half) = (metrics.mean_interval(rows.mean(axis=1)) for rows in (first, second))
+    half = np.hypot(our_half, np.nan_to_num(their_half))
+    return min(low, ours - theirs - half), max(high, ours - theirs + half)
+
+
 def is_above(replicates: list, other: list) -> bool:
-    """Whether all of the interval of the difference lies above 0; never of a single training, which has none."""
-    return len(replicates) > 1 and metrics.difference_interval(on_sites(replicates), on_sites(other))[1] > 0.0
+    """Whether all of both intervals of the difference lies above 0; never of a single training, which has none."""
+    return len(replicates) > 1 and ends_of_difference(replicates, other)[0] > 0.0
 
 
 def is_below(replicates: list, other: list) -> bool:
-    """Whether all of it lies below 0."""
-    return len(replicates) > 1 and metrics.difference_interval(on_sites(replicates), on_sites(other))[2] < 0.0
+    """Whether all of them lies below 0."""
+    return len(replicates) > 1 and ends_of_difference(replicates, other)[1] < 0.0
 
 
-def beside_100(scores: dict) -> int:
-    """1 of a greedy score whose interval lies above 100, -1 of one below, 0 of one that has 100 in it."""
-    return int(scores["score_greedy_low"] > 100.0) - int(scores["score_greedy_high"] < 100.0)
+def ends_of_score(scores: dict, replicates: list, best_plans: list) -> tuple[float, float]:
+    """Ends of both 95 % intervals of a greedy score: over seeds and sites, and by t over seeds."""
+    whole = on_sites(best_plans).to_numpy().mean()
+    mean, half = 100 * np.array(metrics.mean_interval(on_sites(replicates).mean(axis=1))) / whole
+    return min(scores["score_greedy_low"], mean - half), max(scores["score_greedy_high"], mean + half)
+
+
+def beside_100(low: float, high: float) -> int:
+    """1 of a score whose intervals lie above 100, -1 of one below, 0 of one that has 100 in them."""
+    return int(low > 100.0) - int(high < 100.0)
 
 
 def points(replicates: list, other: list, best_plans: list) -> str:
@@ -172,7 +191,11 @@ def paragraph(results, env_id: str) -> str:
         return [method for method in trained if is_above(rows[method], other)]
 
     below = [method for method in trained if is_below(rows[method], rows[PLANTING])]
-    beside = {method: beside_100(scores[method]) for method in trained if len(rows[method]) > 1}
+    beside = {
+        method: beside_100(*ends_of_score(scores[method], rows[method], best_plans))
+        for method in trained
+        if len(rows[method]) > 1
+    }
     over, even, under = ([method for method, side in beside.items() if side == which] for which in (1, 0, -1))
     below_it = "all are below it" if len(under) == len(trained) else f"{len(under)} below it"
     plans = (
@@ -198,7 +221,9 @@ def paragraph(results, env_id: str) -> str:
     longer = with_more_steps(results, env_id)
     if len(longer) > 1:
         its = main_results.scores(longer)
-        side = {1: "above 100", 0: "not told apart from 100", -1: "below 100"}[beside_100(its)]
+        side = {1: "above 100", 0: "not told apart from 100", -1: "below 100"}[
+            beside_100(*ends_of_score(its, longer, best_plans))
+        ]
         budget = f"With {MORE_STEPS:,} steps and {of_seeds(longer)}"
         ahead += f" {budget} {methods.title(LEARNED[-1])} scores {shown(its)}, {side}."
     few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]

@@ -47,6 +47,9 @@ def results(monkeypatch):
     monkeypatch.setattr(main_results, "constant_plans", lambda results: plans)
     monkeypatch.setattr(main_points, "is_above", lambda one, other: SCORES[one[0]] > SCORES[other[0]] + 20)
     monkeypatch.setattr(main_points, "is_below", lambda one, other: SCORES[one[0]] < SCORES[other[0]] - 5)
+    monkeypatch.setattr(
+        main_points, "ends_of_score", lambda its, *_: (its["score_greedy_low"], its["score_greedy_high"])
+    )
     monkeypatch.setattr(main_points, "points", lambda one, other, best: f"{SCORES[one[0]] - SCORES[other[0]]:.1f}")
     monkeypatch.setattr(main_points, "gain_hypervolume", lambda replicates: 2.5)
     monkeypatch.setattr(main_points, "front_of_plans", lambda results, env_id: 3.0)
@@ -110,7 +113,15 @@ def test_the_words_follow_from_the_numbers(results):
 
 @pytest.mark.parametrize(("low", "high", "side"), [(100.1, 103, 1), (99.6, 103, 0), (95, 99.9, -1)])
 def test_which_side_of_100_an_interval_lies_on(low, high, side):
-    assert main_points.beside_100({"score_greedy_low": low, "score_greedy_high": high}) == side
+    assert main_points.beside_100(low, high) == side
+
+
+def test_the_ends_of_a_score_are_those_of_both_its_intervals():
+    scores = {"score_greedy_low": 104.0, "score_greedy_high": 112.0}
+    seeds = replicates(0.0, 0.5, 1.0)  # gains of 10.5, 11, 11.5
+    low, high = main_points.ends_of_score(scores, seeds, replicates(-0.5))
+    half = 100 * 4.30265 * 0.5 / 3**0.5 / 10  # by t of two degrees of freedom
+    assert (low, high) == pytest.approx((110 - half, 110 + half), abs=1e-3)
 
 
 def test_methods_that_are_not_told_apart_from_the_best_are_named(results, monkeypatch):
@@ -129,7 +140,7 @@ def replicates(*shifts):
 
 def test_a_method_is_above_or_below_another_by_all_of_its_interval_on_the_same_sites():
     fixed = replicates(0.0)
-    ours = replicates(0.1, 0.2, 0.3)
+    ours = replicates(0.15, 0.2, 0.25)
     assert main_points.is_above(ours, fixed) and main_points.is_below(
         fixed * 2, ours
     )  # sites differ by more, and cancel

@@ -6,6 +6,8 @@ from analysis.paper_claims.claim import (
     CONTROL,
     LEAST,
     QUARTER,
+    UNTESTABLE,
+    Finding,
     Number,
     Row,
     above,
@@ -33,9 +35,10 @@ def control(evidence, script: str, **flags) -> pd.Series:
 def compared(name: str, first: pd.Series, other: str, second: pd.Series):
     """The finding on a difference of two rows."""
     apart = difference(first, second)
+    common = first.index.intersection(second.index)
     rows = [
-        Row(f"scalarised, {name}", "", seeds(first)),
-        Row(f"scalarised, {other}", "", seeds(second)),
+        Row(f"scalarised, {name}", "", seeds(first[common])),
+        Row(f"scalarised, {other}", "", seeds(second[common])),
         Row("difference, paired by seed", f"{short(PAPERS)} for selecting", apart),
     ]
     return finding(rows, above(apart, least=LEAST, what="the difference"))
@@ -178,8 +181,8 @@ def accepted_are_safe(evidence):
     "The threshold breathes: training expands and contracts with the agent's competence.",
     "Curriculum mechanism",
     MAIN,
-    note="Only directions are judged: by a thousandth a rollout, which is the paper's, the threshold cannot move "
-    "far within the budget, whichever way.",
+    note="By a thousandth a rollout, which is the paper's, the threshold cannot move far within the budget. It moves "
+    "up and down with the coin, too, which knows of no competence: that would have to be measured at every move.",
 )
 def threshold_breathes(evidence):
     table = evidence.by_seed(breathing, "main", CURRICULUM)
@@ -189,14 +192,13 @@ def threshold_breathes(evidence):
         Row("lowest threshold", "", seeds(table.lowest)),
         Row("highest threshold", "", seeds(table.highest)),
         Row("moves up, of all moves %", "both ways", seeds(table.up)),
-    ]
-    return finding(
-        rows,
-        all_of(
-            above(seeds(table.up), 5.0, what="the share of moves up"),
-            below(seeds(table.up), 95.0, what="the share of moves up"),
+        Row(
+            "the same of selection by a coin",
+            "",
+            optional(lambda: seeds(evidence.by_seed(breathing, "controls", CURRICULUM, selector="coin")["up"])),
         ),
-    )
+    ]
+    return Finding(rows, UNTESTABLE)
 
 
 def breathing(one) -> dict:

@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+from scipy import stats
 
 from analysis import metrics, stored
 from analysis.experiments import Job
@@ -39,6 +41,23 @@ def difference(first: pd.Series, second: pd.Series) -> Number:
     if common.empty:
         raise Missing("training seeds that both sides have")
     return seeds(first[common] - second[common])
+
+
+def unpaired(first: pd.Series, second: pd.Series) -> Number:
+    """First less second, of scripts whose trainings share nothing by an equal seed: each side's seeds are drawn for
+    itself, and the t interval is Welch's."""
+    first, second = first.dropna(), second.dropna()
+    if min(len(first), len(second)) < 2:
+        raise Missing("two training seeds of either side")
+    generator = np.random.default_rng(0)
+    drawn = [
+        stats.trim_mean(one.to_numpy()[generator.integers(len(one), size=(20_000, len(one)))], 0.25, axis=1)
+        for one in (first, second)
+    ]
+    low, high = np.percentile(drawn[0] - drawn[1], [2.5, 97.5])
+    t = stats.ttest_ind(first, second, equal_var=False).confidence_interval()
+    value = metrics.iqm(first.to_numpy()) - metrics.iqm(second.to_numpy())
+    return Number(value, low, high, SEEDS, min(len(first), len(second)), t.low, t.high)
 
 
 def mean_of(values, over: str) -> Number:

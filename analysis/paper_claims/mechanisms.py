@@ -351,7 +351,7 @@ def interception_adds(evidence, pair: str) -> Number:
     "More stems store carbon; to permafrost they are a benefit by the snow they catch and a cost by what they absorb.",
     "Section 1; table of physical conflicts",
     STUDY,
-    why="The rows say which parts have the other sign. A good half of what a denser first stand stores less is fire's; "
+    why="The rows say which parts have the other sign. Part of what a denser first stand stores less is fire's; "
     "the rest was not looked into. Planting stores more.",
     note="By its introduction less snow on the ground lets the cold in, and large gains of energy in summer can "
     "overwhelm that; its table calls the conflict complex.",
@@ -451,7 +451,7 @@ def management_protects(evidence):
         Row("thaw gain over zero change, +100 a year", "above 0", gain),
         Row("% of episodes in which it gains", "", share),
         Row("thaw gain over zero change, conifer restoration", "", thaw_gain(evidence, "conifer_restoration")[0]),
-        Row("the best known plan of each of 12 sites (`analysis/studies/fronts.py`)", "", best),
+        Row("the best known plan of each site of `analysis/studies/fronts.py`", "", best),
     ]
     return finding(rows, above(gain, what="the gain of planting"))
 

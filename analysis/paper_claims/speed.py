@@ -156,13 +156,11 @@ def solver_share(evidence):
     "Appendix, runtime",
     BENCHMARK,
     note=FASTER,
-    why="Each worker process has numpy, gymnasium and the compiled physics for itself.",
 )
 def memory(evidence):
     ours = measured(evidence, "async worker")
-    return finding(
-        [Row("a worker's own memory [MB]", published("memory_per_env"), ours)], below(ours, most("memory_per_env"))
-    )
+    what = "a worker's own memory, without what it shares with the others [MB]"
+    return finding([Row(what, published("memory_per_env"), ours)], below(ours, most("memory_per_env")))
 
 
 @claim(

@@ -21,7 +21,7 @@ from analysis.paper_claims.claim import (
     finding,
     short,
 )
-from analysis.paper_claims.evidence import difference, first_and_last, only, optional, seeds
+from analysis.paper_claims.evidence import difference, first_and_last, only, optional, seeds, unpaired
 from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED, curriculum_beats_gated
 from analysis.paper_claims.preference import APART, change
 from analysis.results import by_year
@@ -63,7 +63,7 @@ def conifer_fractions(evidence):
 def ordered(evidence, name: str, first: str, second: str, what: str, papers: str = "above 0", least=None):
     """The finding on one method having more of something than another."""
     values = {script: strategy(evidence, script, name) for script in (first, second)}
-    apart = difference(values[first], values[second])
+    apart = (unpaired if EUPG in values else difference)(values[first], values[second])
     rows = [Row(f"{what}, {methods.title(script)}", "", seeds(values[script])) for script in values]
     rows.append(Row("difference", papers, apart))
     return finding(rows, above(apart, least=least, what="the difference"))
@@ -194,7 +194,7 @@ def older_deciduous(one) -> dict:
 )
 def eupg_keeps_old_trees(evidence):
     stems = {script: evidence.by_seed(older_deciduous, "main", script)["stems"] for script in FRACTIONS}
-    apart = [difference(stems[EUPG], stems[other]) for other in (GATED, CURRICULUM)]
+    apart = [unpaired(stems[EUPG], stems[other]) for other in (GATED, CURRICULUM)]
     rows = [
         Row(f"mature and old deciduous stems/ha, last year, {methods.title(script)}", "", seeds(stems[script]))
         for script in stems
@@ -210,15 +210,16 @@ def eupg_keeps_old_trees(evidence):
     "PPO Gated's density generalises from training to evaluation, Variable λ EUPG's does not.",
     "Appendix, training dynamics",
     MAIN,
-    why="Training draws new sites in every episode, from the evaluation's distribution: there is nothing to overfit "
-    "to.",
+    note="The density in training is of sampled actions, that of the evaluation's annual record of greedy ones; with "
+    "the sampled policy's record it could be tested. Training draws new sites in every episode, from the "
+    "evaluation's distribution.",
 )
 def density_generalises(evidence):
     shift = {}
     for script in (GATED, EUPG):
         late = evidence.by_seed(late_density, "main", script)["late"]
         shift[script] = 100 * (strategy(evidence, script, "final_density") / late - 1).abs()
-    apart = difference(shift[EUPG], shift[GATED])
+    apart = unpaired(shift[EUPG], shift[GATED])
     rows = [
         Row(
             f"density at evaluation against late training, difference in %, {methods.title(script)}",
@@ -228,8 +229,7 @@ def density_generalises(evidence):
         for script in shift
     ]
     rows.append(Row("EUPG less PPO Gated", "above 0", apart))
-    small = below(seeds(shift[GATED]), 10, what="PPO Gated's own")
-    return finding(rows, all_of(above(apart, what="the difference"), small))
+    return Finding(rows, UNTESTABLE)
 
 
 def late_density(one) -> dict:
@@ -278,7 +278,7 @@ def gradient_dominance(evidence):
 )
 def longer_season(evidence):
     days = {script: evidence.by_seed(mean_season, "main", script).days for script in (CURRICULUM, "zero_change")}
-    apart = seeds(days[CURRICULUM] - days["zero_change"].iloc[0])
+    apart = Number(days[CURRICULUM].mean() - days["zero_change"].iloc[0])  # exact: no seed and no action changes it
     return finding(
         [Row("growing season less that of zero change, same episodes [days]", "above 0", apart)],
         above(apart, least=1.0, what="the difference"),

@@ -68,7 +68,7 @@ SENTENCES = (
     ),
     Sentence(
         asymmetry.physics_hides_thaw,
-        "thaw over zero change, agents of thaw alone, `--baseline others`",
+        asymmetry.MISSED,
         "On a single site thaw is not learnt even with a baseline: its delay is enough to hide it",
         "What hides thaw is not its delay: on a single site the same agents learn it once a baseline is taken off",
         "Whether delay alone hides thaw is open",
