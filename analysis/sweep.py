@@ -21,6 +21,7 @@ from cleanrl_style.flags import LIMITS, require
 
 require("tyro")
 
+import numpy as np
 import pandas as pd
 import tyro
 
@@ -32,6 +33,7 @@ from cleanrl_style.protocol.agents import load_script
 from sim.block import LANES, lanes_for
 from sim.executor import HERE, RAY_HERE, NoCluster, check_address, default_address
 
+VALIDATED = "validation_gain"
 OURS = ("seed", "run_dir", "overwrite")  # arguments of a script that are no setting
 
 
@@ -169,25 +171,35 @@ def part_of(found: list[Run], part: str) -> list[Run]:
     return found[int(match[1]) - 1 :: int(match[2])]
 
 
-def returns(run: Run) -> dict[str, float]:
-    """Mean returns over the evaluation's weights and episodes, the scalarised one first."""
-    evaluation = runs.read_run(run.folder).evaluation
-    columns = ["scalarized_return", *fronts.return_columns(fronts.objectives_of(evaluation.columns))]
-    return evaluation[columns].mean().to_dict()
+def numbers_of(run: Run) -> dict[str, float]:
+    """What it gained on validation sites at its end (NaN of a training too short to have been played there), and mean
+    returns over the evaluation's weights and episodes, the scalarised one first."""
+    read = runs.read_run(run.folder)
+    columns = ["scalarized_return", *fronts.return_columns(fronts.objectives_of(read.evaluation.columns))]
+    course = read.tables.get("validation")
+    last = np.nan if course is None else course[course.global_step == course.global_step.max()].scalarized_gain.mean()
+    return {VALIDATED: last, **read.evaluation[columns].mean()}
 
 
 def table_of(found: list[Run]) -> pd.DataFrame:
-    """A row a run: settings, seed, returns."""
-    return pd.DataFrame([{**run.settings, "seed": run.seed, **returns(run)} for run in found])
+    """A row a run: settings, seed, gain on validation sites, returns."""
+    return pd.DataFrame([{**run.settings, "seed": run.seed, **numbers_of(run)} for run in found])
 
 
 def summary(table: pd.DataFrame, settings: list[str]) -> pd.DataFrame:
-    """A row a setting as text: interquartile means over its seeds, with 95 % intervals; the best first."""
-    values = [name for name in table if name not in (*settings, "seed")]
+    """A row a setting as text: interquartile means over its seeds, with 95 % intervals.
+
+    The best on validation sites first: results are of the test sites, and nothing is chosen on them. In the grid's
+    order if trainings were too short for validation.
+    """
+    validated = table[VALIDATED].notna().all()
+    values = [name for name in table if name not in (*settings, "seed", *([] if validated else [VALIDATED]))]
     rows = []
     for key, group in table.groupby(settings, sort=False) if settings else [((), table)]:
         rows.append({**dict(zip(settings, key, strict=True)), "seeds": len(group), **over_seeds(group[values])})
-    best = pd.DataFrame(rows).sort_values("scalarized_return", ascending=False, kind="stable")
+    best = pd.DataFrame(rows)
+    if validated:
+        best = best.sort_values(VALIDATED, ascending=False, kind="stable")
     best["seeds"] = best.seeds.astype(str)
     return readable(best, {name: name for name in (*settings, "seeds", *values)})
 

@@ -22,10 +22,14 @@ def args(folder, seeds="1-2", grid=("learning_rate=1e-4,3e-4",), script=SCRIPT, 
 
 
 def finish(runs, shift=0.0):
-    """Runs as if they had been trained; those of the larger learning rate are better by 1."""
+    """Runs as if they had been trained; those of the larger learning rate are better by 1 on test sites, and worse on
+    those of the validation."""
     for run in runs:
-        better = float(run.settings.get("learning_rate") == "3e-4") + 0.1 * run.seed + shift
-        write_run(run.folder, "ppo_group", seed=run.seed, carbon=(better,) * 3, thaw=(better,) * 3)
+        better = float(run.settings.get("learning_rate") == "3e-4")
+        returns = (better + 0.1 * run.seed + shift,) * 3
+        write_run(run.folder, "ppo_group", seed=run.seed, carbon=returns, thaw=returns)
+        gains = {"global_step": (1, 2, 2), "preference": (0.0, 0.0, 1.0), "scalarized_gain": (9.0, 1.0, 3.0 - better)}
+        pd.DataFrame(gains).to_csv(run.folder / "validation.csv", index=False)
 
 
 def test_every_combination_a_seed_of_all_before_the_next(tmp_path):
@@ -59,10 +63,23 @@ def test_finished_runs_are_skipped_and_a_table_made(tmp_path, capsys, monkeypatc
     sweep.main(args(tmp_path))
     assert started == [runs[-1].command]
     table = pd.read_csv(tmp_path / "sweep.csv")
-    assert list(table) == ["learning_rate", "seed", "scalarized_return", "carbon_return", "thaw_return"]
+    assert list(table) == [
+        *("learning_rate", "seed", "validation_gain"),
+        *("scalarized_return", "carbon_return", "thaw_return"),
+    ]
     assert table.carbon_return.round(6).tolist() == [0.1, 1.1, 0.2, 1.2]
     best, worst = capsys.readouterr().out.splitlines()[-3:-1]
-    assert best.split()[:3] == ["3e-4", "2", "1.15"] and worst.split()[:3] == ["1e-4", "2", "0.15"]
+    assert best.split()[:2] == ["1e-4", "2"] and worst.split()[:2] == ["3e-4", "2"]  # chosen on validation sites
+    assert table.validation_gain.tolist() == [2.0, 1.5, 2.0, 1.5]
+
+
+def test_trainings_too_short_for_validation_are_not_ranked(tmp_path, capsys):
+    runs = sweep.all_runs(args(tmp_path))
+    finish(runs)
+    (runs[0].folder / "validation.csv").unlink()
+    sweep.main(args(tmp_path))
+    names, *rows = capsys.readouterr().out.splitlines()[-4:-1]
+    assert "validation_gain" not in names and [row.split()[0] for row in rows] == ["1e-4", "3e-4"]
 
 
 def test_parts_are_all_runs_once(tmp_path, capsys):
