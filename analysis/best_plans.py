@@ -45,8 +45,8 @@ class Args:
     """episodes of a site's search"""
     seed: int = 1
     """of the search"""
-    folder: Path = Path("sim", "task", FOLDER)
-    """folder of the plans that ship"""
+    folder: Path | None = None
+    """folder of the plans as they ship (None: sim/task/best_plans; of another search or folder, beside the tables)"""
     output_dir: Path | None = None
     """folder of the tables (None: results/studies/best_plans)"""
 
@@ -174,11 +174,14 @@ def main(args: Args) -> None:
     except ValueError as error:
         sys.exit(f"error: --sites: {error}")
     folder = args.output_dir or paths.studies() / "best_plans"
+    same_search = (args.budget, args.seed) == (Args.budget, Args.seed)
+    ships = same_search and args.sites == Args.sites and args.output_dir is None
+    plans_folder = args.folder or (Path("sim", "task", FOLDER) if ships else folder)
     paths.make_writable("--output-dir", folder)
-    paths.make_writable("--folder", args.folder)
+    paths.make_writable("--folder", plans_folder)
     physics = open_loop.fingerprint()
     for task in tasks:
-        path = folder / f"{task.env_id}.csv"
+        path = folder / f"{task.env_id}{'' if same_search else f'-{args.budget}-{args.seed}'}.csv"
         settings = {"budget": args.budget, "seed": args.seed, "physics": physics}
         tables = [stored.read(path, text=("plan",))] if stored.is_finished(path, settings) else []
         there = {seed for table in tables for seed in table.seed}
@@ -199,7 +202,7 @@ def main(args: Args) -> None:
         table = pd.concat(tables, ignore_index=True)
         table = table[table.seed.isin(seeds)]
         print(summary(table, weights_of(task)).to_string(float_format="%.2f"))
-        print(f"wrote {ship(table, args.folder, task.env_id)}", flush=True)
+        print(f"wrote {ship(table, plans_folder, task.env_id)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ def small(tmp_path, monkeypatch):
 
 def test_a_stopped_search_goes_on_and_its_fronts_are_played(small, tmp_path, monkeypatch, capsys):
     small("whole")
-    whole = (tmp_path / "whole" / "quick-v0.csv").read_bytes()
+    whole = (tmp_path / "whole" / "quick-v0-60-1.csv").read_bytes()
     shipped = (tmp_path / "shipped" / "quick-v0.csv.gz").read_bytes()
     write = stored.write
 
@@ -78,11 +78,11 @@ def test_a_stopped_search_goes_on_and_its_fronts_are_played(small, tmp_path, mon
         small("stopped")
     small("stopped")
     assert "quick-v0: 1 of 2 sites are in" in capsys.readouterr().out
-    assert (tmp_path / "stopped" / "quick-v0.csv").read_bytes() == whole
+    assert (tmp_path / "stopped" / "quick-v0-60-1.csv").read_bytes() == whole
     assert (tmp_path / "shipped" / "quick-v0.csv.gz").read_bytes() == shipped
 
     # the front of a site is what its plans return, step by step
-    table = stored.read(tmp_path / "whole" / "quick-v0.csv", text=("plan",))
+    table = stored.read(tmp_path / "whole" / "quick-v0-60-1.csv", text=("plan",))
     seed = sites.published_seeds("test")[1]
     found = table[table.front & (table.seed == seed)]
     env = gym.make("quick-v0", disable_env_checker=True, record_steps=True)  # which changes no return

@@ -122,7 +122,8 @@ def study(args: Args, name: str, world: dict, policy: Callable, folder: Path) ->
         "address": args.address,
         **world,
     }
-    where = f"{args.spacing:g}deg-{args.years}years-{'climate' if args.climate else 'latitude'}.zarr"
+    climate = args.climate.stem if args.climate else "latitude"
+    where = f"{args.spacing:g}deg-{args.years}years-{args.env_id}-{climate}.zarr"
     places = sites(args)
     print(f"{len(places):,} stands, with the policy and without", flush=True)
     acted = sim.simulate_many(places, policy, path=folder / f"{name}-{args.preference:g}-{where}", **shared)

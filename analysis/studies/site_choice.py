@@ -4,9 +4,9 @@
 
 The constant plans that are best anywhere are played on sampled sites, each with one first stand under several weathers
 and dice, the same for all plans. Three ways to choose: one plan for all sites; for each site the best one on the very
-dice that it is judged on, which no agent can know; and for each site the best one on all other dice, which an agent
-that knew the site to perfection could. Leaves results/studies/site_choice.csv, a row a task and weight, and weight
-"all", in which gains are scores: 100 is one plan for all sites, its own for each weight.
+dice that it is judged on, which no agent can know; and for each site the best one on all other dice, a little less
+than what an agent could that knew the site to perfection. Leaves results/studies/site_choice.csv, a row a task and
+weight, and weight "all", in which gains are scores: 100 is one plan for all sites, its own for each weight.
 """
 
 from dataclasses import dataclass
