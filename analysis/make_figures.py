@@ -99,7 +99,8 @@ def main(args: Args) -> None:
         with matplotlib.rc_context(STYLE):
             figure = Figure(figsize=size, layout="constrained")
             drawing(figure)
-            figure.supxlabel(textwrap.fill(many_objectives.CAPTION, int(18 * size[0])), fontsize=6)
+            world = name.removeprefix(f"{many_objectives.STEM}_")
+            figure.supxlabel(textwrap.fill(f"{world}. {many_objectives.CAPTION}", int(18 * size[0])), fontsize=6)
             save(figure, folder / name)
     say_what_was_not_run("figures", not_run)
     print(f"{len(FIGURES) - len(not_run) + len(others)} figures: {folder}/*.png, *.pdf")

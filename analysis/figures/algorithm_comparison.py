@@ -1,4 +1,4 @@
-"""The three preference-conditioned methods and the fixed strategies: learning, evaluation, trade-offs."""
+"""The preference-conditioned methods and the fixed strategies: learning, evaluation, trade-offs."""
 
 import numpy as np
 

@@ -59,7 +59,7 @@ def draw(figure, results) -> None:
             np.arange(len(AGE_CLASSES)) + GROUP / len(LEARNERS) * (k - (len(LEARNERS) - 1) / 2),
             stems.mean(axis=1),
             BARS / len(LEARNERS),
-            yerr=stems.std(axis=1),
+            yerr=stems.std(axis=1, ddof=1) if stems.shape[1] > 1 else None,
             color=method.colour,
             error_kw={"linewidth": 0.6},
         )

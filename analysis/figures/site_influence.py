@@ -11,8 +11,10 @@ SIZE = (7, 3)
 MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
     "(a) evaluation, a point a site, mean over methods, weights and seeds; line: lowest to highest method; sd: "
-    f"standard deviation. (b) {SEEDS_95}."
+    "standard deviation; dotted: the least that fifty years can return, -1 each, where a few sites lie. "
+    f"(b) {SEEDS_95}."
 )
+LEAST = -50.0  # fifty years of a reward that is cut off at -1
 
 
 def draw(figure, results) -> None:
@@ -47,6 +49,8 @@ def draw_sites(ax, thaw: pd.DataFrame) -> None:
     x = [feature["boundary_above_air_k"] for feature in features]
     ax.vlines(x, thaw.min(axis=1), thaw.max(axis=1), color="#D55E00", linewidth=1.3)
     ax.plot(x, thaw.mean(axis=1), "o", color="black", markersize=2)
+    if thaw.to_numpy().min() < 0.99 * LEAST:
+        ax.axhline(LEAST, color="black", linestyle=":", linewidth=0.7)
     if thaw.shape[1] > 1 and len(thaw) > 1:
         between, within = thaw.mean(axis=1).std(), np.sqrt(thaw.var(axis=1).mean())
         note = f"sd between sites: {between:.1f}\nsd between methods on a site: {within:.1f}"

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from matplotlib.colors import to_rgba
 
 from analysis.figures.common import (
     SEEDS_95,
@@ -56,5 +57,6 @@ def whiskers(ax, of_weights: pd.DataFrame, method) -> None:
     for size, weight in zip(np.linspace(3, 8, len(of_weights)), of_weights.index, strict=True):
         low, median, high = ([x[q][weight], y[q][weight]] for q in ("p10", "p50", "p90"))
         xerr, yerr = ([[m - a], [b - m]] for a, m, b in zip(low, median, high, strict=True))
-        style = {"fmt": method.marker, "color": method.colour, "linewidth": 0.8, "markersize": size}
+        pale = to_rgba(method.colour, 0.3)  # most of it overlaps
+        style = {"fmt": method.marker, "color": method.colour, "ecolor": pale, "linewidth": 0.8, "markersize": size}
         ax.errorbar(*median, xerr=xerr, yerr=yerr, **style)
