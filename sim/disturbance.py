@@ -102,7 +102,7 @@ def burn(b, i):
 
 @phase
 def insects(b, i):
-    """An outbreak, if dice, the past winter and density agree; the dead are laid down."""
+    """An outbreak, if dice, the calendar year's winter months and density agree; the dead are laid down."""
     p, w, r, d = b.p, b.w, b.r, b.d
     conifers, deciduous = count_stand(b, i)
     density = conifers + deciduous

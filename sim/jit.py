@@ -6,7 +6,8 @@ strict (no fastmath), so that one stand and sixteen stands in lockstep give the 
 the zero check of each division, and `forceinline` the calls, without which no loop over lanes is vectorised.
 
 Two faults of numba's disk cache are worked around here. It keys by the caller's own file and misses a change in a
-callee of another file: the cache folder is named by a hash of all of `sim/`. And it names compiled code by counters
+callee of another file: the cache folder is named by a hash of `sim/*.py`, where all kernels are (values of tables are
+passed in). And it names compiled code by counters
 of the compiling process, so that kernels for one and for sixteen lanes, compiled by two processes, are taken for each
 other in a third: each number of lanes gets functions with names of their own.
 """

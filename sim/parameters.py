@@ -92,6 +92,7 @@ ORDERED_CONSTANTS = (
     ("organic_conductivity_saturated", "organic_conductivity_saturated_frozen"),
 )
 
+MOST_NOISE_C = 15.0  # s.d. of daily temperature about the year's course: Yakutia's winter has 9 to 10 K
 WHOLE_CONSTANTS = ("young_age_limit", "mature_age_limit")
 
 _LOWEST, _HIGHEST = np.array([(p.physical_low, p.physical_high) for p in SITE_PARAMETERS.values()]).T
@@ -160,6 +161,21 @@ def scale_site(site: dict[str, float]) -> np.ndarray:
         raise ValueError(f"site: {', '.join(missing[:3])}{more} missing; sim.sample_site and sim.middle_site give all")
     parameters = {name: SITE_PARAMETERS[name] for name in OBSERVED_SITE_PARAMETERS}
     return np.array([(_check_number(name, site[name], p) - p.low) / (p.high - p.low) for name, p in parameters.items()])
+
+
+def check_noise(values: dict) -> None:
+    """Raise ValueError for observed weather whose temperature would swing more than anywhere on Earth.
+
+    values : parameters by name. The weather generator's noise is the site's times a factor of the season, then.
+    """
+    if not values["weather_as_observed"]:
+        return
+    name = max((name for name in values if name.startswith("noise_factor_")), key=values.__getitem__)
+    if values["daily_noise_std_c"] * values[name] > MOST_NOISE_C:
+        raise ValueError(
+            f"daily_noise_std_c = {values['daily_noise_std_c']:g}: with weather as observed, in which {name} = "
+            f"{values[name]:g} multiplies it, at most {MOST_NOISE_C / values[name]:.3g} is allowed"
+        )
 
 
 def check_overrides(overrides: dict | None) -> dict[str, tuple[float, float]]:

@@ -16,12 +16,12 @@ from sim.parameters import SITE_PARAMETERS, brief, check_mapping, is_integer, mi
 from sim.physical_constants import FREEZING_POINT_K
 from sim.scenario import FIRST_YEAR
 from sim.spin_up import BOUNDARIES, BOUNDARY, INITIAL_RANGES, check_initial, crown_covers, first_state, first_stems
-from sim.stands import HELD_COLUMNS, Stands
+from sim.stands import HELD_COLUMNS, MOST_YEARS, Stands
 from sim.state import DAILY, DAILY_NAMES, DAYS, PARAMETER_NAMES, RECORD, RECORD_NAMES
 from sim.structure import leaf_out
 
 OUTPUTS = ("annual", "daily", "xarray")
-DEFAULT_YEARS, MOST_YEARS = 50, 5_000
+DEFAULT_YEARS = 50
 DATES = (1678, 2261)  # years whose nanoseconds xarray can count
 DEFAULT_MINUTES = 30
 NUMBER = (int, float, np.number)

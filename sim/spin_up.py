@@ -243,19 +243,20 @@ def first_stems(state: np.ndarray) -> np.ndarray:
 def drawn_stocks(dice: dict, given: dict, ranges: dict) -> dict[str, float]:
     """First stocks by record name, from uniform numbers by name; biomass within what the stems can hold.
 
-    That is `LARGEST_STEM_KGC` a stem: beyond it the upper end of its range is cut off, and if need be the lower. Where
-    biomass is given and density drawn, there are at least the stems that hold it.
+    That is `most_biomass`: beyond it the upper end of its range is cut off, and if need be the lower. Where biomass is
+    given and density drawn, there are at least the stems that hold it.
     """
     stocks = {name: low + (high - low) * dice[name] for name, (low, high) in ranges.items()}
     stocks.update(given)
     classes = [stocks[name] for name in CLASS_NAMES if name in stocks]
     density = sum(classes) if classes else stocks["density_stems_ha"]
-    if "biomass_kgc_m2" not in given and density > 0.0:
-        held = density * LARGEST_STEM_KGC * 1e-4
+    if "biomass_kgc_m2" not in given:
+        _, held = most_biomass(stocks)
         low, high = (min(end, held) for end in ranges["biomass_kgc_m2"])
         stocks["biomass_kgc_m2"] = low + (high - low) * dice["biomass_kgc_m2"]
     if "biomass_kgc_m2" in given and not classes and "density_stems_ha" not in given:
-        stocks["density_stems_ha"] = max(density, given["biomass_kgc_m2"] / (LARGEST_STEM_KGC * 1e-4))
+        _, of_a_stem = most_biomass({**stocks, "density_stems_ha": 1.0})
+        stocks["density_stems_ha"] = max(density, given["biomass_kgc_m2"] / of_a_stem)
     return stocks
 
 

@@ -7,6 +7,7 @@ all that a year depends on, as those of policies that have not parted yet, are s
 """
 
 import os
+import warnings
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -27,6 +28,7 @@ from sim.parameters import (
     check_constants,
     check_mechanisms,
     check_name,
+    check_noise,
     check_overrides,
     check_seed,
     check_site,
@@ -71,6 +73,7 @@ DRAWN_AT_ONCE = 1024  # stands whose numbers a thread draws, where a GPU simulat
 LONGEST_STEP_MINUTES = 120  # beyond, the air is up to 2 K too warm
 MOST_THREADS = 10_000  # so that a mistake of a thousandfold is named
 MOST_STANDS = 10_000_000  # of 5 kB each
+MOST_YEARS = 5_000
 
 
 class Stands:
@@ -159,7 +162,8 @@ class Stands:
         """Put stands at the beginning of an episode: draw their first state and spin it up.
 
         stands : indices; sites : for each, its parameters by name; seeds : for each, its `Seeds`;
-        initial : position in `stands` -> dict of first stocks by record name; initial_ranges : ranges that the first
+        initial : position in `stands` -> dict of first stocks by record name, each checked for itself (that they go
+        together `simulate` and the environment see to); initial_ranges : ranges that the first
         stocks are drawn from, name -> (low, high), instead of `sim.spin_up.INITIAL_RANGES`; observed : a year's
         forcing to spin up with, instead of generated weather (a part of a year is not used).
         """
@@ -171,6 +175,7 @@ class Stands:
                 raise ValueError(f"{what}: one for each of {len(stands)} stands is allowed, got {len(values)}")
         for site, its_seeds in zip(sites, seeds, strict=True):
             check_site(site)
+            check_noise({**site, **self.constants, **self.weather})
             check_seeds("seeds", its_seeds)
         if observed is not None:
             check_observed(observed, len(observed))
@@ -249,6 +254,15 @@ class Stands:
                     years = zip(sites, record[:, deep_mean], heat + 0.5 * gain, state[:, deep], strict=True)
                     self.parameters[stands, boundary] = [boundary_in_balance(*each) for each in years]
             self.state[stands] = state
+        if self.boundary == "balanced":
+            limits, found = SITE_PARAMETERS[BOUNDARY], self.parameters[stands, boundary]
+            beyond = stands[(found <= limits.physical_low) | (found >= limits.physical_high)]
+            if len(beyond):
+                ends = f"[{limits.physical_low:g}, {limits.physical_high:g}] K"
+                what = (
+                    f"boundary='balanced': stand {beyond[0]} would need one outside of {ends}, so heat flows through it"
+                )
+                warnings.warn(what, stacklevel=4)
         return record
 
     def step(self, actions, stands=None, observed=None, days=DAYS, daily=False):
@@ -349,7 +363,7 @@ class Stands:
         if np.shape(state["years"]) != self.years.shape:
             raise ValueError(f"state of {np.size(state['years'])} stands given to {self.number}")
         for name in ARRAYS:
-            low, high = (0, 1000) if name == "years" else (-np.inf, np.inf)  # any bits are a stream's
+            low, high = (0, MOST_YEARS) if name == "years" else (-np.inf, np.inf)  # any bits are a stream's
             check_array(f"{what}: {name}", state[name], getattr(self, name), low, high)
         if not isinstance(state["seeds"], list) or len(state["seeds"]) != self.number:
             raise ValueError(f"{what}: seeds: a list of {self.number} is allowed, got {brief(state['seeds'])}")
@@ -362,6 +376,7 @@ class Stands:
             values = dict(zip(PARAMETER_NAMES, row.tolist(), strict=True))
             check_overrides({name: values[name] for name in SITE_PARAMETERS})
             check_constants({name: values[name] for name in self.constants})
+            check_noise(values)
 
     def set_state(self, state: dict) -> None:
         """Continue from a `get_state` of as many stands; ValueError, and nothing done, for what is none.

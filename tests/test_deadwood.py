@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import sim
+from sim.state import STATE_NAMES
 
 QUIET = {"fire": False, "insects": False}
 QUICK = {"seed": 1, "time_step_minutes": 120}
@@ -58,10 +59,13 @@ def test_a_dead_tree_leaves_its_stem_to_dead_wood():
 
 
 def test_what_is_left_without_stems_is_laid_down():
-    table = simulate(None, years=1, initial={"density_stems_ha": 0.0}, mechanisms=QUIET, **QUICK)
-    assert table.mortality_kgc_m2[0] > 0.5  # what was drawn for it
-    stems = columns(table, "input")[0] / [constant(f"stem_share_{species}") for species in SPECIES]
-    assert stems.sum() == pytest.approx(table.mortality_kgc_m2[0])
+    stands = sim.Stands(1, time_step_minutes=120, mechanisms=QUIET)
+    stands.start([0], [sim.middle_site()], [sim.episode_seeds(1)], {0: {"density_stems_ha": 0.0}})
+    stands.state[0, [STATE_NAMES.index(f"{species}_biomass") for species in SPECIES]] = 1.0, 0.5
+    year = dict(zip(sim.RECORD_NAMES, stands.step([12])[0], strict=True))
+    assert year["mortality_kgc_m2"] == pytest.approx(1.5) and year["biomass_kgc_m2"] == 0.0
+    for species, carbon in zip(SPECIES, (1.0, 0.5), strict=True):
+        assert year[f"{species}_deadwood_input_kgc_m2"] == pytest.approx(carbon * constant(f"stem_share_{species}"))
 
 
 def test_a_fire_burns_its_share_of_dead_wood_and_the_stems_it_kills_become_such():

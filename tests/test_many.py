@@ -323,6 +323,14 @@ def climate(**variables):
     return xarray.Dataset(variables, coords={"lat": [65.0, 60.0, 55.0], "lon": [0.0, 120.0, 240.0]})
 
 
+def test_points_beside_the_date_line_take_the_nearest_across_it():
+    lon = np.arange(-180.0, 180.0, 2.5)
+    values = np.tile(np.linspace(1.0, 1.9, len(lon)), (2, 1))
+    noise = xarray.Dataset({"daily_noise_std_c": (("lat", "lon"), values)}, coords={"lat": [60.0, 65.0], "lon": lon})
+    found = sim.sites_on_grid([60.0], [179.9, 177.0, -179.9], climate=noise)
+    assert found.daily_noise_std_c.tolist() == pytest.approx([1.0, 1.9, 1.0])
+
+
 def test_gridded_climate(tmp_path):
     """Monthly means of a cosine give its mean and half-range; sea is left out; longitudes go either way round."""
     days = (np.arange(365 * 24) + 0.5) / (365 * 24)

@@ -187,7 +187,7 @@ def test_the_middle_stand_is_one_that_could_be_drawn():
 
 def test_a_site_without_stems_keeps_no_living_carbon():
     table = simulate(initial={"density_stems_ha": 0.0}, years=2)
-    assert table.biomass_kgc_m2[0] == 0.0 and table.mortality_kgc_m2[0] > 0.5  # what was drawn for it
+    assert table.biomass_kgc_m2[0] == table.mortality_kgc_m2[0] == 0.0
     assert table.gpp_kgc_m2[0] == table.understorey_gpp_kgc_m2[0] > 0.0
     assert table.density_stems_ha[0] > 0.0  # recruits
 
@@ -231,6 +231,11 @@ def test_the_boundary_in_balance_does_not_hang_on_the_sites_own():
     assert abs(difference) < 0.2
 
 
+def test_a_boundary_that_cannot_be_in_balance_is_told():
+    with pytest.warns(UserWarning, match=r"boundary='balanced': stand 0 would need one outside of \[260, 285\] K"):
+        simulate({"mean_annual_temperature_c": -20.0, "winter_snow_mm_day": 0.2}, boundary="balanced")
+
+
 def test_balanced_soil_carbon_keeps_what_it_gets():
     initial = {"conifer_mature_stems_ha": 1500.0, "biomass_kgc_m2": 5.6}
     quiet = {"fire": False, "insects": False}
@@ -243,6 +248,13 @@ def test_balanced_soil_carbon_keeps_what_it_gets():
     assert given.soil_kgc_m2[0] - given.soil_change_kgc_m2[0] == pytest.approx(3.0)
     treeless = {"density_stems_ha": 0.0}
     pd.testing.assert_frame_equal(simulate(initial=treeless, soil_carbon="balanced"), simulate(initial=treeless))
+
+
+def test_first_biomass_is_within_what_the_stems_hold():
+    for initial in ({"conifer_seedling_stems_ha": 2000.0}, {"density_stems_ha": 500.0, "oldest_age_years": 5.0}):
+        assert simulate(initial=initial).biomass_kgc_m2[0] < 0.3
+    heavy = simulate(initial={"biomass_kgc_m2": 2.0, "oldest_age_years": 30.0})
+    assert heavy.density_stems_ha[0] > 2.0 / (120.0 * 1e-4)  # as many as it takes at that age, not fewer and larger
 
 
 def test_weather_as_observed_varies_more_and_keeps_its_means():
@@ -725,6 +737,10 @@ BAD = {
     "two boundaries": (
         {"boundary": -1.0, "site": {"deep_boundary_temperature_k": 270.0}},
         r"boundary = -1: the site has deep_boundary_temperature_k too",
+    ),
+    "noise of another planet": (
+        {"weather": "observed", "site": {"daily_noise_std_c": 5.0}},
+        r"daily_noise_std_c = 5: with weather as observed, .* noise_factor_winter = 5.9 multiplies it, at most 2.54",
     ),
     "carbon of no stems": (
         {"initial": {"density_stems_ha": 0.0, "biomass_kgc_m2": 5.0}},

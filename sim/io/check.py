@@ -5,7 +5,7 @@ import pandas as pd
 
 from sim.io.clock import DAY, hours_apart, noon_of
 from sim.io.columns import MM_A_YEAR
-from sim.io.plausible import DAYS_OF_A_YEAR, LEAST_HUMIDITY, LEAST_SUN_W_M2
+from sim.io.plausible import DAYS_OF_A_YEAR, LEAST_HUMIDITY
 from sim.state import DAYS, FORCING
 
 #: Allowed values of an observed forcing: column -> (low, high, unit, hint).
@@ -17,7 +17,8 @@ FORCING_LIMITS = {
     "longwave_w_m2": (50.0, 600.0, "W m-2", ""),
     "precipitation_mm": (0.0, 200.0, "mm per interval", ""),
 }
-NOON_WITHIN_H = 3.0
+FAR_FROM_NOON_H = 3.0
+CLEAR_DAY_W_M2 = 50.0  # at least, on the ground on the brightest days of a year
 
 
 def interval_of(forcing) -> int:
@@ -115,10 +116,10 @@ def _check_units(year: pd.DataFrame, minutes: int) -> None:
     when = f"in {year.index[0].year}"
     days = year["shortwave_w_m2"].groupby(year.index.normalize()).mean()
     brightest = float(days.quantile(0.98))
-    if brightest < LEAST_SUN_W_M2:
+    if brightest < CLEAR_DAY_W_M2:
         raise ValueError(
             f"forcing: shortwave_w_m2 is {brightest:.3g} W m-2 on a clear summer day {when}; at least "
-            f"{LEAST_SUN_W_M2:g} is allowed (is it in MJ m-2?)"
+            f"{CLEAR_DAY_W_M2:g} is allowed (is it in MJ m-2?)"
         )
     humidity = float(year["relative_humidity"].median())
     if humidity < LEAST_HUMIDITY:
@@ -136,7 +137,7 @@ def _check_units(year: pd.DataFrame, minutes: int) -> None:
 
 def _check_noon(forcing: pd.DataFrame, minutes: int) -> None:
     noon = noon_of(forcing.index, minutes, forcing["shortwave_w_m2"].to_numpy(float))
-    if noon is not None and abs(hours_apart(noon, 12.0)) > NOON_WITHIN_H:
+    if noon is not None and abs(hours_apart(noon, 12.0)) > FAR_FROM_NOON_H:
         clock = f"{int(noon):02d}:{int(noon % 1 * 60):02d}"
         raise ValueError(
             f"forcing: its sun is highest at {clock}; times of local solar time, highest at 12:00, are allowed, which "

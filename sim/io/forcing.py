@@ -165,7 +165,7 @@ def read_forcing(
     report += [f"unusual, and taken as it is: {line}" for line in taken]
     _repeat_at_edges(record, flags, row_of, interval)
     _fill(table, record, flags, row_of, choice, interval, gaps, longest_gap_days)
-    _add_longwave(record, flags, choice, latitude_deg)
+    _add_longwave(record, flags, latitude_deg)
     report.append(in_numbers(record, interval))
     site = {"latitude_deg": float(latitude_deg), **climate_of(record["air_temperature"])}
     flags = flags.fillna(GIVEN).astype("int8")
@@ -488,7 +488,7 @@ def _name(choice: Choice, quantity: str) -> str:
     return column.name if column else "wind"
 
 
-def _add_longwave(record, flags, choice: Choice, latitude_deg: float) -> None:
+def _add_longwave(record, flags, latitude_deg: float) -> None:
     """Compute the longwave that is missing, in place."""
     lacking = record[record["longwave"].isna() & record["air_temperature"].notna() & record["humidity"].notna()]
     if lacking.empty:

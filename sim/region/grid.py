@@ -136,6 +136,12 @@ def nearest(values, points: dict):
             )
     import xarray
 
+    if LONGITUDE in points:  # from 179 E it is nearer to 180 W than to 177 E
+        last, first = (
+            values.isel({LONGITUDE: [k]}).assign_coords({LONGITUDE: values[LONGITUDE][[k]] + turn})
+            for k, turn in ((-1, -360.0), (0, 360.0))
+        )
+        values = xarray.concat([last, values, first], LONGITUDE)
     return values.sel(
         {name: xarray.DataArray(wanted, dims=dim) for name, (dim, wanted) in points.items()}, method="nearest"
     )

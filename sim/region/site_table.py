@@ -11,7 +11,7 @@ from sim.spin_up import INITIAL_LIMITS, check_initial, most_biomass
 
 OTHERS = ("middle", "sampled")
 LATITUDE, LONGITUDE, SEED = "latitude_deg", "longitude_deg", "seed"
-DENSITY, BIOMASS = "density_stems_ha", "biomass_kgc_m2"
+BIOMASS = "biomass_kgc_m2"
 UNITS = {"stems_ha": "stems ha-1", "kgc_m2": "kgC m-2", "layer_m": "m", "age_years": "yr", "fraction": "1"}
 
 
