@@ -17,11 +17,15 @@ MARGIN = 0.05
 UNDISTURBED = {"fire": False, "insects": False}
 FLUXES = {"gpp": "GPP", "reco": "ecosystem respiration", "nee": "NEE, uptake negative", "et": "evapotranspiration"}
 UNITS = {"gpp": "gC m-2 day-1", "reco": "gC m-2 day-1", "nee": "gC m-2 day-1", "et": "mm day-1"}
+#: What likely is behind a flux below and above the towers'.
 LIKELY = {
-    "gpp": "colder climate than any tower's; light use is that of forests on better ground",
-    "reco": "little soil carbon (2-10 kgC/m2) with one slow pool in a cold climate",
-    "nee": "respiration too low; GPP perhaps too high, as these sites are colder than every tower",
-    "et": "colder climate than any tower's; autumn rain is scarce",
+    "gpp": ("a colder climate than any tower's", "light use is that of forests on better ground"),
+    "reco": ("little soil carbon (2-10 kgC/m2) with one slow pool in a cold climate", "young soil carbon in warm soil"),
+    "nee": (
+        "GPP too high, respiration too low, or both: see their biases",
+        "GPP too low, respiration too high, or both",
+    ),
+    "et": ("a colder climate than any tower's; autumn rain is scarce", "the ground evaporates too much"),
 }
 
 
@@ -65,7 +69,7 @@ def report(sites: int) -> Part:
             rows[-1] += [", ".join(outside) or "none", verdict]
             if verdict != "in":
                 what = f"{label} over the year: bias {number(s.bias, sign=True)} {UNITS[name]}, towers' median course"
-                misses.append(Miss(kind, what, LIKELY[name]))
+                misses.append(Miss(kind, what, LIKELY[name][int(s.bias > 0.0)]))
     temperature = forest_towers.mean_annual_temperature()[forest_towers.near_climate()]
     text = f"""Mature stands held as in part 1 on {sites} sites, {YEARS} years, over the towers in forests without a
 disturbance since {forest_towers.UNDISTURBED_BEFORE} and with a mean annual temperature of at most
