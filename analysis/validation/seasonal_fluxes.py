@@ -20,12 +20,12 @@ UNITS = {"gpp": "gC m-2 day-1", "reco": "gC m-2 day-1", "nee": "gC m-2 day-1", "
 #: What likely is behind a flux below and above the towers'.
 LIKELY = {
     "gpp": ("a colder climate than any tower's", "light use is that of forests on better ground"),
-    "reco": ("little soil carbon (2-10 kgC/m2) with one slow pool in a cold climate", "young soil carbon in warm soil"),
+    "reco": ("little soil carbon (2-10 kgC/m2) with one slow pool in a cold climate", "not looked into"),
     "nee": (
         "GPP too high, respiration too low, or both: see their biases",
-        "GPP too low, respiration too high, or both",
+        "not looked into",
     ),
-    "et": ("a colder climate than any tower's; autumn rain is scarce", "the ground evaporates too much"),
+    "et": ("a colder climate than any tower's; autumn rain is scarce", "not looked into"),
 }
 
 

@@ -26,8 +26,8 @@ snow_share_of = np.vectorize(climate_records.uncompiled(snow_share))
 
 @dataclass(frozen=True)
 class Statistic:
-    """A property of daily weather by season, its tolerance (absolute, or a share of the record), and what of the paper's
-    weather is likely behind a difference from the record."""
+    """A property of daily weather by season, its tolerance (absolute, or a share of the record), and what of the
+    paper's weather is likely behind a difference from the record."""
 
     label: str
     unit: str
