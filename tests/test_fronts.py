@@ -4,7 +4,7 @@ import pytest
 from scripts import run_script
 
 from analysis import stored
-from analysis.studies import draw_conflict, fronts, genes, nsga2, open_loop
+from analysis.studies import fronts, genes, nsga2, open_loop
 
 TINY = genes.Budget(population=8, generations=2, weathers=1, report_weathers=2)
 
@@ -123,41 +123,3 @@ def test_a_finished_front_is_not_searched_again(tmp_path, monkeypatch, capsys):
 def test_refusals(capsys):
     with pytest.raises(SystemExit, match="--sites 401: 1 to 400 are"):
         run_script("analysis/studies/fronts.py", "--sites", 401)
-
-
-def test_figure(tmp_path):
-    args = draw_conflict.Args(results=tmp_path, path=tmp_path / "conflict.png")
-    with pytest.raises(SystemExit, match="python analysis/studies/fronts.py makes it"):
-        draw_conflict.main(args)
-    summary = pd.DataFrame(
-        [
-            {"site_seed": 7, "off": off, "boundary_above_air_k": 3, "snow_mm_day": 1, **fronts.summarise(hand_case())}
-            for off in (fronts.ALL_ON, "moss")
-        ]
-    )
-    stored.write(tmp_path / "fronts/summary.csv", summary[:1], {})
-    stored.write(fronts.path_of(tmp_path / "fronts", 7, fronts.ALL_ON), hand_case(), {})
-    with pytest.raises(SystemExit, match="fronts.py --without-mechanisms makes it"):
-        draw_conflict.main(args)
-    stored.write(tmp_path / "fronts/mechanisms/summary.csv", summary, {})
-    parts = (
-        "site",
-        "weather",
-        "policy",
-        "site x weather",
-        "site x policy",
-        "weather x policy",
-        "site x weather x policy",
-    )
-    components = [
-        {"objective": objective, "value": value, "component": part, "share": 1 / 7}
-        for objective in open_loop.OBJECTIVES
-        for value in ("return", "one year")
-        for part in parts
-    ]
-    stored.write(tmp_path / "variance/components.csv", pd.DataFrame(components), {})
-    draw_conflict.main(args)
-    first = args.path.read_bytes()
-    assert first.startswith(b"\x89PNG")
-    draw_conflict.main(args)
-    assert args.path.read_bytes() == first

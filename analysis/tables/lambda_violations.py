@@ -12,6 +12,7 @@ from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 
 MADE_BY = "python analysis/reproduce.py --only main"
 COLUMNS = ROW_COLUMNS | {
+    "responding": "of them respond",
     "pairs": "pairs of weights",
     "violations_percent": "violations %",
     "violations_or_ties_percent": "violations and ties %",
@@ -49,6 +50,7 @@ def make(results) -> pd.DataFrame:
             continue
         table = pd.DataFrame([violations(one) for one in replicates], columns=names).astype(float)
         row = row_of(key, len(table)) | over_seeds(table.drop(columns="pairs")) | {"pairs": table.pairs.mean()}
+        row["responding"] = int(table.pairs.notna().sum())  # to the preference at all; the percentages are of these
         name = results.paper_name(key)
         if name in published.index:
             row["paper_violations_percent"] = published[name]
