@@ -269,7 +269,8 @@ class Stands:
         """Advance stands by a year under the given actions.
 
         actions : integers in [0, 25), one a stand; stands : indices, all by default; observed : forcing
-        (days x steps a day, 6) for all stands, or None; days : fewer than 365 for a partial forcing.
+        (days x steps a day, 6) for all stands, or None; days : fewer than 365 for a partial forcing, of which the daily
+        output is right, and the record of no use: it divides by 365, and deaths and recruits are a whole year's.
         Returns the annual record, shape (stands, columns of `RECORD_NAMES`); with `daily`, also the daily output,
         shape (stands, days, columns of `sim.state.DAILY`).
         """
