@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterable
 
 from sim.block import compiling, is_compiled, kernel
+from sim.draws import drawer
 
 LOGGER = logging.getLogger("sim.block")  # it says in one line, on stderr, what is said here
 INTERVAL = 5.0  # seconds between signs of life
@@ -17,7 +18,7 @@ _UNDER_WAY: dict[int, multiprocessing.Process] = {}  # by lanes, what is compile
 
 
 def compile_physics(lanes: Iterable[int], later: Iterable[int] = ()) -> None:
-    """Have kernels for so many lanes ready on disk, the first of them in this process.
+    """Have kernels for so many lanes ready on disk, the first of them in this process, and what draws its numbers.
 
     later : of kernels that are needed later: compiled in the background once the first are there, so that the command
     goes on. Before worker processes are forked, all this saves each of them the loading. Says nothing where all are
@@ -30,6 +31,7 @@ def compile_physics(lanes: Iterable[int], later: Iterable[int] = ()) -> None:
     with contextlib.nullcontext() if complete else alive(compiling(first)):
         finish(first)
         kernel(first)
+        drawer("numba")
         for number in others:
             finish(number)
     for number in dict.fromkeys(later):
