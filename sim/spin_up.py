@@ -111,14 +111,17 @@ def most_biomass(stocks) -> tuple | None:
 
     None where neither density nor classes are given.
     """
+    return most_of_stems(stocks) if {"density_stems_ha", *CLASS_NAMES} & set(stocks) else None
+
+
+def most_of_stems(stocks) -> tuple:
+    """The same, of stocks that have density or classes."""
     first, largest = first_ages(DEFAULTS), largest_stems()
     by_class = [(stocks[name], k) for k, name in enumerate(CLASS_NAMES) if name in stocks]
     if by_class:
         ends = [largest[row, first[size + 1] - 1] for row, size in (divmod(k, len(AGE_CLASSES)) for _, k in by_class)]
         stems = sum(number for number, _ in by_class)
         return stems, sum(number * end for (number, _), end in zip(by_class, ends, strict=True)) * 1e-4
-    if "density_stems_ha" not in stocks:
-        return None
     stems = stocks["density_stems_ha"]
     if "oldest_age_years" not in stocks:
         return stems, stems * LARGEST_STEM_KGC * 1e-4
@@ -251,11 +254,11 @@ def drawn_stocks(dice: dict, given: dict, ranges: dict) -> dict[str, float]:
     classes = [stocks[name] for name in CLASS_NAMES if name in stocks]
     density = sum(classes) if classes else stocks["density_stems_ha"]
     if "biomass_kgc_m2" not in given:
-        _, held = most_biomass(stocks)
+        _, held = most_of_stems(stocks)
         low, high = (min(end, held) for end in ranges["biomass_kgc_m2"])
         stocks["biomass_kgc_m2"] = low + (high - low) * dice["biomass_kgc_m2"]
     if "biomass_kgc_m2" in given and not classes and "density_stems_ha" not in given:
-        _, of_a_stem = most_biomass({**stocks, "density_stems_ha": 1.0})
+        _, of_a_stem = most_of_stems({**stocks, "density_stems_ha": 1.0})
         stocks["density_stems_ha"] = max(density, given["biomass_kgc_m2"] / of_a_stem)
     return stocks
 

@@ -255,14 +255,11 @@ class Stands:
                     self.parameters[stands, boundary] = [boundary_in_balance(*each) for each in years]
             self.state[stands] = state
         if self.boundary == "balanced":
-            limits, found = SITE_PARAMETERS[BOUNDARY], self.parameters[stands, boundary]
-            beyond = stands[(found <= limits.physical_low) | (found >= limits.physical_high)]
+            allowed, found = SITE_PARAMETERS[BOUNDARY], self.parameters[stands, boundary]
+            beyond = stands[(found <= allowed.physical_low) | (found >= allowed.physical_high)]
             if len(beyond):
-                ends = f"[{limits.physical_low:g}, {limits.physical_high:g}] K"
-                what = (
-                    f"boundary='balanced': stand {beyond[0]} would need one outside of {ends}, so heat flows through it"
-                )
-                warnings.warn(what, stacklevel=4)
+                ends = f"[{allowed.physical_low:g}, {allowed.physical_high:g}] K, so heat flows through it"
+                warnings.warn(f"boundary='balanced': stand {beyond[0]} would need one outside of {ends}", stacklevel=4)
         return record
 
     def step(self, actions, stands=None, observed=None, days=DAYS, daily=False):
