@@ -254,9 +254,7 @@ def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, t
 
 
 def test_of_two_processes_that_start_at_once_the_second_leaves_no_configuration(tmp_path):
-    hold = (
-        "import fcntl, sys; f = open('timing.csv', 'wb'); fcntl.lockf(f, fcntl.LOCK_EX); print(1, flush=True); input()"
-    )
+    hold = "import fcntl; f = open('timing.csv', 'wb'); fcntl.lockf(f, fcntl.LOCK_EX); print(1, flush=True); input()"
     with subprocess.Popen(
         [sys.executable, "-c", hold], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as first:
