@@ -301,22 +301,17 @@ class Stands:
         """Positions of the first of stands that are alike in all that the year depends on; for each stand, its place
         among them."""
         each = np.arange(len(stands))
-        keys: list[tuple] = list(zip(actions.tolist(), map(bytes, parameters), strict=True))
-        for more in (self._state_of, self._streams_of):  # the dearer, of those alone that are alike so far
-            number = Counter(keys)
-            if len(number) == len(stands):
+        keys: list[tuple] = list(zip(actions.tolist(), map(bytes, self.streams[stands]), strict=True))
+        # the dearer, of those alone that are alike so far
+        for more in (lambda k: parameters[k].tobytes(), lambda k: self.state[stands[k]].tobytes()):
+            if len(set(keys)) == len(keys):
                 return each, each
-            keys = [(*key, more(stand)) if number[key] > 1 else key for key, stand in zip(keys, stands, strict=True)]
+            number = Counter(keys)
+            keys = [(*key, more(k)) if number[key] > 1 else key for k, key in enumerate(keys)]
         first: dict[tuple, int] = {}
         for k, key in enumerate(keys):
             each[k] = first.setdefault(key, k)
         return np.unique(each, return_inverse=True)
-
-    def _state_of(self, stand) -> bytes:
-        return self.state[stand].tobytes()
-
-    def _streams_of(self, stand) -> bytes:
-        return self.streams[stand].tobytes()
 
     def parameters_of_year(self, stands) -> np.ndarray:
         """`parameters` of stands (stands, fields), with what a scenario makes of the year to come."""
