@@ -73,9 +73,11 @@ The paper's simulator and ours are two programs with the same purpose. Values of
 agree; what a method can do, what comes out ahead, and which way a mechanism works should. Where ours differ, the claim
 says why, as far as an experiment tells.
 
-**Numbers.** Ours are interquartile means over training seeds with 95 % bootstrap intervals, of the policy that the runs
-name primary, the greedy one, on the same evaluation sites and weathers; differences between
-methods are paired by seed. Returns are sums over 50 years; gains are returns less those of zero change on the same
+**Numbers.** Ours are of `boreal-generalist-v0`, the paper's task, where a row names no other. They are interquartile
+means over training seeds, of the policy that the runs name primary, the greedy one, on the same evaluation sites and
+weathers, with 95 % intervals: bootstrap and t, each end of the one that reaches further. Differences are paired by seed
+between runs of one script, and between Curriculum and PPO Gated, which train on the same episodes; between others each
+side's seeds are its own. Returns are sums over 50 years; gains are returns less those of zero change on the same
 episodes. What is over sites or episodes is a mean with its 95 % t interval, a correlation with Fisher's, a share with
 Wilson's, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
 pairs of stands are compared the active layer stands beside it.
@@ -91,9 +93,8 @@ Beyond that signs are judged, not sizes: how large the paper's difference is sta
 met if all of our interval lies in it, give or take a tenth, and not if all of it lies outside. A cost is met if ours is
 no larger. A claim of several parts does not hold if one of them does not. A bootstrap over few seeds is too narrow (of
 normal values it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five, and for the t interval
-of the seeds' mean, which is not printed, to agree. Dozens of intervals are judged one by one, uncorrected. Those over
-training seeds hold for these evaluation sites: other sites are another matter. Curriculum and PPO Gated of one seed
-train on the same episodes; EUPG's are others, and share the evaluation alone.
+of the seeds' mean to agree. Dozens of intervals are judged one by one, uncorrected. Those over training seeds hold for
+these evaluation sites: other sites are another matter.
 """
 
 

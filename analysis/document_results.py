@@ -243,7 +243,10 @@ def difficulty(results: Results) -> str:
 
 
 def choices_of(script: str, *experiments_: str):
-    """A script with one choice changed less its default, bold where both intervals of five seeds and more lack 0."""
+    """A script with one choice changed less its default, bold where both intervals of five seeds and more lack 0.
+
+    That an interval lacks 0 has to be seen: as it is printed.
+    """
 
     def written(results: Results) -> str:
         table = choices.make(results, script)
@@ -254,8 +257,11 @@ def choices_of(script: str, *experiments_: str):
         rows = []
         for row in table.to_dict("records"):
             cells = cells_of(row, decimals)
-            for k, name in enumerate(decimals):
-                cells[k] = f"**{cells[k]}**" if row[f"{name}_told"] and row["seeds"] >= FEWEST_SEEDS else cells[k]
+            for k, (name, digits) in enumerate(decimals.items()):
+                seen = row[f"{name}_told"] and (
+                    round(row[f"{name}_low"], digits) > 0 or round(row[f"{name}_high"], digits) < 0
+                )
+                cells[k] = f"**{cells[k]}**" if seen and row["seeds"] >= FEWEST_SEEDS else cells[k]
             rows.append([flags(row["setting"]), f"`{row['environment']}`", str(row["seeds"]), *cells])
         header = [choices.COLUMNS[name] for name in ("setting", "environment", "seeds", *decimals)]
         return excerpts.markdown(header, rows)
@@ -287,8 +293,9 @@ def averaged(results: Results) -> str:
 
 
 def in_points(gained: pd.DataFrame, plans: np.ndarray) -> str:
-    """Score of sets of trainings (sets, sites) with its interval; that of a single set is over sites alone."""
-    score = metrics.score_interval(np.repeat(gained, 2, axis=0) if len(gained) == 1 else gained, plans)
+    """Score of sets of trainings (sets, sites) with its interval; of few sets of their mean, over sites alone."""
+    few = len(gained) < FEWEST_SEEDS
+    score = metrics.score_interval(np.tile(gained.mean(axis=0), (2, 1)) if few else gained, plans)
     return "{:.1f} [{:.1f}, {:.1f}]".format(*score)
 
 

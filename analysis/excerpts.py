@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 from analysis import paths, stored
 from analysis.studies import boreal_map as region_map
@@ -172,8 +173,8 @@ def knowing_the_site() -> str:
             f"{by_parameters.score:.1f} [{by_parameters.score_low:.1f}, {by_parameters.score_high:.1f}]",
         )
         thaw = table[(table.task == row.task) & (table.weight.astype(str) == "0.0")].iloc[0]
-        spread = [f"{thaw[name]:.2f}" for name in ("conifers_less_deciduous", "sd_sites", "sd_dice")]
-        rows.append([f"`{row.task}`", "100", *scores, *spread])
+        spread = [f"{thaw[name]:.2f}" for name in ("sd_sites", "sd_dice")]
+        rows.append([f"`{row.task}`", "100", *scores, conifers_less_deciduous(thaw), *spread])
     header = ["task", "one plan for all sites", "the best of each site, on the dice that judge it"]
     header += [
         "the best of each site, on other dice",
@@ -182,6 +183,15 @@ def knowing_the_site() -> str:
         "its deviation between sites",
     ]
     return markdown([*header, "between dice of a site"], rows)
+
+
+def conifers_less_deciduous(row: pd.Series) -> str:
+    """The mean over sites and dice of `site_choice`, with its 95 % t interval over sites."""
+    made = stored.settings(site_choice.path())
+    error = np.sqrt((row.sd_sites**2 + row.sd_dice**2 / made["dice"]) / made["sites"])
+    half = stats.t.ppf(0.975, made["sites"] - 1) * error
+    value = row.conifers_less_deciduous
+    return f"{value:.2f} [{value - half:.2f}, {value + half:.2f}]"
 
 
 def gradient() -> str:

@@ -212,7 +212,7 @@ def paragraph(results, env_id: str) -> str:
     ahead += f", not told apart from {listed(titles_of(alike))}." if alike else "."
     ahead += (
         f" Its score less that of 100 deciduous trees a year is {points(rows[best], deciduous, best_plans)}. "
-        f"By their intervals {named(over)} above 100"
+        f"By both intervals, that of seeds and sites and that of seeds alone by t, {named(over)} above 100"
         + (f", {named(even)} not told apart from it" if even else "")
         + (f", {below_it}" if under else "")
         + f"; {named(above(rows[PLANTING]))} above planting half and half; "
@@ -224,8 +224,11 @@ def paragraph(results, env_id: str) -> str:
         side = {1: "above 100", 0: "not told apart from 100", -1: "below 100"}[
             beside_100(*ends_of_score(its, longer, best_plans))
         ]
+        scores = f"{methods.title(LEARNED[-1])} scores {shown(its)}, {side}"
         budget = f"With {MORE_STEPS:,} steps and {of_seeds(longer)}"
-        ahead += f" {budget} {methods.title(LEARNED[-1])} scores {shown(its)}, {side}."
+        of_these_sites = points(longer, best_plans, best_plans)
+        ahead += f" {budget} {scores}, where every drawn set of sites has its own best plans."
+        ahead += f" Less the best plans of just these sites it is {of_these_sites}."
     few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]
     if few:
         ahead += f" Few training seeds: {listed([f'{methods.title(*method)} {len(rows[method])}' for method in few])}."

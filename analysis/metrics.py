@@ -204,7 +204,9 @@ def plans_of_sites(plans: pd.DataFrame, weights: np.ndarray) -> np.ndarray:
     return np.einsum("mas,km->aks", np.array(cube), weights)
 
 
-def score_interval(gained: np.ndarray, plans: np.ndarray | None, repetitions: int = 4000) -> tuple[float, float, float]:
+def score_interval(
+    gained: np.ndarray, plans: np.ndarray | None, repetitions: int = 20_000
+) -> tuple[float, float, float]:
     """IQM of the score over training seeds, and its 95 % bootstrap interval over seeds and sites, both drawn anew.
 
     gained : (seeds, sites), of `of_sites`; plans : (plans, weights, sites) on the same sites, whose best is chosen

@@ -96,7 +96,7 @@ def test_a_verdict_needs_both_intervals():
     number = Number(1, 0.5, 2, SEEDS, 5, -0.1, 1.9)
     assert number.ends == (-0.1, 2) and number.mirrored.ends == (-2, 0.1)
     assert above(number).holds is None and within(number, 0, 2).holds is None
-    assert str(number) == "1 [0.5, 2]"
+    assert str(number) == "1 [−0.1, 2]"
 
 
 def test_ranges_and_several_parts():

@@ -87,7 +87,8 @@ def test_more_steps_are_a_row_of_their_own(results):
         "\n| Group PPO, 1,000,000 steps | 5 | 110 [105, 115] | 110 [105, 115] |\n"
     )
     words = " ".join(main_points.in_words(results).split())
-    assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110 [105, 115], above 100." in words
+    assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110 [105, 115], above 100, where every" in words
+    assert "Less the best plans of just these sites it is 10.0." in words
 
 
 def test_the_words_follow_from_the_numbers(results):
@@ -99,8 +100,8 @@ def test_the_words_follow_from_the_numbers(results):
     )
     assert ahead == (
         "Of 5 trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds and a gain hypervolume "
-        "of 2.50. Its score less that of 100 deciduous trees a year is 15.0. By their intervals "
-        "Group PPO is above 100, 3 below it; Group PPO is above planting "
+        "of 2.50. Its score less that of 100 deciduous trees a year is 15.0. By both intervals, that of seeds and "
+        "sites and that of seeds alone by t, Group PPO is above 100, 3 below it; Group PPO is above planting "
         "half and half; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
     )
     assert followed == (

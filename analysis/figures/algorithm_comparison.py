@@ -4,6 +4,7 @@ import numpy as np
 
 from analysis import metrics
 from analysis.figures.common import (
+    OF_SITES,
     RETURNS,
     SEEDS_95,
     STEPS,
@@ -23,9 +24,9 @@ SIZE = (7, 5.6)
 MADE_BY = "python analysis/reproduce.py --only main"
 SHOWN = (*LEARNERS, *STRATEGIES)
 CAPTION = (
-    f"Returns are sums over 50 years. (a) {SEEDS_95}. (b) 0: doing nothing, 100: the best constant plan of each "
-    "weight; bars: interquartile mean over seeds, left greedy, right sampled; dots: seeds. (c) a point a weight, "
-    "mean over seeds. (d) large: mean over seeds, small: seeds."
+    f"Returns are sums over 50 years. (a) {SEEDS_95}; {OF_SITES}. (b) 0: doing nothing, 100: the best constant plan of "
+    "each weight; bars: interquartile mean over seeds, left greedy, right sampled; dots: seeds. (c) a point a weight, "
+    "plain mean over seeds. (d) large: mean over seeds, small: seeds."
 )
 
 

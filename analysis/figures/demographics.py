@@ -40,6 +40,8 @@ def draw(figure, results) -> None:
                     ax, results.of("main", method.script), f"{species}_{age}_stems_ha", method.colour, label, style
                 )
         finish(ax, xlabel="year", ylabel="stems/ha", ylim=(0, None))
+    for species, style in (("conifers", "-"), ("deciduous trees", "--")):
+        axes[0].plot([], [], style, color="black", label=species)
 
     training, evaluation = axes[5:]
     for method in learners(training, results):

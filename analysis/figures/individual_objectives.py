@@ -4,6 +4,7 @@ import numpy as np
 
 from analysis import metrics
 from analysis.figures.common import (
+    OF_SITES,
     SEEDS_95,
     STEPS,
     band,
@@ -17,7 +18,7 @@ from cleanrl_style.protocol.fronts import evaluation_weights
 
 SIZE = (7, 5.2)
 MADE_BY = "python analysis/reproduce.py --only main"
-CAPTION = f"Returns are sums over 50 years; {SEEDS_95}. (c, d) means over the episodes."
+CAPTION = f"Returns are sums over 50 years; {SEEDS_95}. (a, b) {OF_SITES}. (c, d) means over the episodes."
 OBJECTIVES = {"carbon_return": "carbon return", "thaw_return": "thaw return"}
 
 

@@ -2,6 +2,7 @@
 
 from analysis.experiments import GENERALIST
 from analysis.figures.common import (
+    OF_SITES,
     SEEDS_95,
     STEPS,
     finish,
@@ -20,8 +21,7 @@ MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
     "Sums over 50 years: (a-c) returns of training episodes, whose sites differ; (d-f) what the greedy policy gains"
     f" over doing nothing on ten validation sites, always the same, mean of the weights 0, 0.5 and 1; {SEEDS_95}. "
-    "Group PPO meets an eighth of the sites of the others, so its training returns swing more. Best constant plans "
-    "are the best in the weighted sum, not in each objective."
+    f"{OF_SITES}. Best constant plans are the best in the weighted sum, not in each objective."
 )
 MARKS = {"best": (":", "Best constant plan of each weight"), "plus_100": ("--", "+100 a year")}
 QUANTITIES = {"carbon": "carbon", "thaw": "thaw", "scalarized": "scalarised"}

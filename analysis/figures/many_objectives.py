@@ -83,11 +83,16 @@ def colour_of(weights) -> str:
 
 
 def parallel(ax, table, references, objectives, low, high) -> None:
-    """An axis an objective, from its lowest to its highest return of any method; a line a weight."""
+    """An axis an objective, from its lowest to its highest return of any method; a line a weight.
+
+    Lines of later objectives are thinner and on top, so that those below them are seen too.
+    """
     span = np.where(high > low, high - low, 1.0)
     x = np.arange(len(objectives))
     for weights, returns in zip(table.index, table.to_numpy(), strict=True):
-        ax.plot(x, (returns - low) / span, color=colour_of(weights), linewidth=0.9, alpha=0.8)
+        place = COLOURS.index(colour_of(weights)) if colour_of(weights) != EQUAL else 0
+        look = {"linewidth": max(2.4 - 0.6 * place, 0.6), "zorder": 2 + 0.1 * place}
+        ax.plot(x, (returns - low) / span, color=colour_of(weights), **look)
     for returns in references:
         ax.plot(x, (returns - low) / span, "--", color=REFERENCE, linewidth=0.9)
     for k in x:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from analysis.figures.common import (
+    OF_SITES,
     RETURNS,
     SEEDS_95,
     finish,
@@ -19,8 +20,9 @@ from analysis.results import by_year
 SIZE = (7, 5.4)
 MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
-    "(a) mean over the seeds in eighths of the training, the mark is the last. (b) a point a weight. "
-    f"(c) {SEEDS_95}. (d) mean over the weights 0, 0.5 and 1 and seeds; bars: sd over seeds."
+    "(a) mean over the seeds in eighths of the training, the mark is the last. "
+    f"{OF_SITES}. (b) a point a weight, plain mean over seeds. (c) {SEEDS_95}. "
+    "(d) mean over the weights 0, 0.5 and 1 and seeds; bars: sd over seeds."
 )
 PARTS = 8  # of the training
 GROUP, BARS = 0.81, 0.75  # width of a class's bars, with the gaps between them and without

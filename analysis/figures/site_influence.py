@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 import sim
-from analysis.figures.common import SEEDS_95, STEPS, finish, learners, learning_curve, legend, panels
+from analysis.figures.common import OF_SITES, SEEDS_95, STEPS, finish, learners, learning_curve, legend, panels
 from analysis.studies import open_loop
 
 SIZE = (7, 3)
@@ -12,7 +12,7 @@ MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
     "(a) evaluation, a point a site, mean over methods, weights and seeds; line: lowest to highest method; sd: "
     "standard deviation; dotted: the least that fifty years can return, -1 each, where a few sites lie. "
-    f"(b) {SEEDS_95}."
+    f"(b) {SEEDS_95}; {OF_SITES}."
 )
 LEAST = -50.0  # fifty years of a reward that is cut off at -1
 

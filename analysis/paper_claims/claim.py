@@ -77,7 +77,7 @@ class Number:
 
     def __str__(self) -> str:
         text = short(self.value)
-        return text if np.isnan(self.low) else f"{text} [{short(self.low)}, {short(self.high)}]"
+        return text if np.isnan(self.low) else f"{text} [{', '.join(map(short, self.ends))}]"
 
     @property
     def basis(self) -> str:

@@ -260,7 +260,7 @@ def gradient_dominance(evidence):
     ]
     gradient = evidence.results.study("gradient_noise")
     if gradient is not None:
-        script = gradient[(gradient.utility == "total") & (gradient.baseline == "none")].set_index("objective")
+        script = gradient[(gradient.utility == "future") & (gradient.baseline == "none")].set_index("objective")
         rows += [
             Row(f"square of the noise in EUPG's gradient of {name}, before training", "", Number(script.noise[name]))
             for name in ("carbon", "thaw")

@@ -42,14 +42,16 @@ SENTENCES = (
         performance.curriculum_beats_gated,
         "scalarised, Curriculum less Gated",
         "Choosing sites pays: Curriculum PPO is better than PPO Gated",
-        "Choosing sites pays little or nothing here: Curriculum PPO is not shown to be better than PPO Gated",
+        "Choosing sites pays less than 25 points of score here, if anything: Curriculum PPO is not shown to be better "
+        "than PPO Gated",
         "Whether choosing sites pays is open",
     ),
     Sentence(
         performance.gated_beats_heuristics,
         "PPO Gated less the best of them",
         "PPO Gated is better than every fixed strategy",
-        "PPO Gated is no better than the best fixed strategy, which looks at nothing or at the density alone",
+        "PPO Gated is no better than the best of the paper's fixed strategies, which look at nothing or at the density "
+        "alone",
         "Whether PPO Gated is better than every fixed strategy is open",
     ),
     Sentence(
@@ -70,14 +72,15 @@ SENTENCES = (
         asymmetry.physics_hides_thaw,
         asymmetry.MISSED,
         "On a single site thaw is not learnt even with a baseline: its delay is enough to hide it",
-        "What hides thaw is not its delay: on a single site the same agents learn it once a baseline is taken off",
+        "What hides thaw is not its delay: on a single site the same agents learn it once eight episodes share an "
+        "update and their mean is taken off",
         "Whether delay alone hides thaw is open",
     ),
     Sentence(
         curriculum.coin,
         "difference, paired by seed",
         "Selecting by site is worth more than selecting by a coin",
-        "Selecting by site is worth little or no more than selecting by a coin",
+        "Selecting by site is worth less than 25 points of score more than selecting by a coin, if anything",
         "Whether selecting by site is worth more than selecting by a coin is open",
     ),
     Sentence(
@@ -92,7 +95,7 @@ SENTENCES = (
         paper_itself.hypervolumes,
         "hypervolume, Curriculum PPO",
         "The paper's hypervolumes follow from its table of detailed objectives",
-        "The paper's hypervolumes do not follow from its own table of detailed objectives",
+        "The paper's hypervolumes do not follow from its own table of detailed objectives, if they are of mean returns",
         "The paper's hypervolumes cannot be checked",
     ),
 )

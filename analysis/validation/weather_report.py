@@ -270,7 +270,7 @@ def draw(here: dict, there: dict, as_observed: dict, towers: dict) -> bytes:
     for ax, (name, statistic) in zip(axes, STATISTICS.items(), strict=False):
         low, median, high = np.percentile(here[name], [10, 50, 90], axis=0)
         ax.fill_between(month, low, high, color=BLUE, alpha=0.2, lw=0, label='weather "paper", sampled sites: 10-90 %')
-        ax.plot(month, median, color=BLUE, lw=1.3, label='weather "paper", sampled sites: median')
+        ax.plot(month, median, color=BLUE, lw=1.3, zorder=3, ls=":", label='weather "paper", sampled sites: median')
         for weather, world, colour in zip(WEATHERS, (there, as_observed), (ORANGE, PURPLE), strict=True):
             label = f'weather "{weather}", climate of US-Prr: median'
             ax.plot(month, np.nanmedian(world[name], axis=0), color=colour, lw=1.5, label=label)
