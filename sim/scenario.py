@@ -107,6 +107,8 @@ def _check_column(name: str, values, years) -> np.ndarray:
         raise ValueError(f"scenario {name}: a number for each year is allowed, got a masked one")
     try:
         numbers = np.asarray(values, dtype=float)
+        if any(isinstance(value, (bool, np.bool_)) for value in np.ravel(np.asarray(values, dtype=object))):
+            raise TypeError
     except (TypeError, ValueError):
         raise ValueError(f"scenario {name}: a number for each year is allowed, got {_no_number(values)!r}") from None
     if numbers.ndim != 1 or not len(numbers):
@@ -131,6 +133,8 @@ def _no_number(values):
         try:
             float(value)
         except (TypeError, ValueError):
+            return value
+        if isinstance(value, (bool, np.bool_)):
             return value
     return values
 

@@ -143,7 +143,7 @@ def simulate(
         if np.ndim(value):
             raise ValueError(f"site: {name} = {value!r}: one number is allowed for one stand")
     if hold_stand:
-        overrides |= HELD_STAND
+        overrides = {**overrides, **HELD_STAND}
     stand = Stands(
         1,
         time_step_minutes=time_step_minutes,
@@ -185,7 +185,7 @@ def simulate(
         records.append(record)
         if output != "annual":
             rows.append(daily[0])
-    annual = _table(np.concatenate(records), RECORD_NAMES, _new_year(first_year, years), 1)
+    annual = _table(np.concatenate(records), RECORD_NAMES, _new_year(first_year, years))
     if output == "annual":
         return annual
     daily = _table(np.concatenate(rows), DAILY_NAMES, _dates(first_year, years, days), days)
@@ -228,7 +228,11 @@ def _of_forcing(given: dict, forcing: pd.DataFrame) -> dict:
         raise ValueError(
             f"{name} = {float(wanted):g}: the forcing is of {told[name]:g}, and the sun has to be that of its place"
         )
-    return {**climate_of(forcing["air_temperature_c"]), **told, **given}
+    # of whole years, and then no more than where the search for the ground's balance begins: so within a site's limits
+    found = climate_of(forcing["air_temperature_c"])
+    for name, value in found.items():
+        found[name] = min(max(value, SITE_PARAMETERS[name].physical_low), SITE_PARAMETERS[name].physical_high)
+    return {**told, **found, **given}
 
 
 def _check_part(days: int, output: str, overrides: dict) -> None:
@@ -284,16 +288,16 @@ def _with_leaf_area(site: dict, lai, stand: Stands, seeds, stocks: dict) -> dict
     return site | {name: site[name] * (lai / now) for name in there}
 
 
-def _table(values: np.ndarray, names, dates: pd.DatetimeIndex, days: int) -> pd.DataFrame:
-    """A table of years or days, with dates and units."""
+def _table(values: np.ndarray, names, dates: pd.DatetimeIndex, days: int | None = None) -> pd.DataFrame:
+    """A table with dates and units, a row a year or, where it is said how many a year has, a day."""
     table = pd.DataFrame(values, columns=names, index=dates)
     table[NET_EXCHANGE] = (
         table["autotrophic_respiration_kgc_m2"] + table["heterotrophic_respiration_kgc_m2"] - table["gpp_kgc_m2"]
     )
-    if days > 1:
+    if days is not None:
         table.insert(0, "doy", np.arange(len(table)) % days + 1)
-    table.insert(0, "year", np.arange(len(table)) // days)
-    described = (DAILY if days > 1 else RECORD) | ADDED
+    table.insert(0, "year", np.arange(len(table)) // (days or 1))
+    described = (RECORD if days is None else DAILY) | ADDED
     table.attrs["units"] = {name: described[name][0] for name in table}
     return table
 

@@ -25,6 +25,7 @@ crown_factor, weight = uncompiled(structure.crown_factor), uncompiled(stem_weigh
 
 DEFAULTS = {name: parameter.low for name, parameter in CONSTANTS.items()}
 SPIN_UP_YEARS = 8
+SPIN_UP_YEARS_OF_A_RECORD = 30  # near 0 degC eight are too few, and of one stand time is no matter
 SPIN_UP_STEPS_PER_DAY = 12
 LONGEST_LEAP = 15.0  # years
 FIRST_SNOW_DENSITY = 200.0  # kg m-3
@@ -90,9 +91,10 @@ def check_stocks(values: dict | None, limits=INITIAL_LIMITS) -> dict:
 def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float]:
     """First stocks by record name, which have to go together, too. Raises ValueError as `check_stocks`."""
     values = check_stocks(values, limits)
-    for name in values:
-        if name in CLASS_NAMES and set(values) & {"density_stems_ha", "conifer_fraction", "oldest_age_years"}:
-            raise ValueError(f"initial {name}: stems by class exclude density, conifer fraction and oldest age")
+    classes = [name for name in values if name in CLASS_NAMES]
+    together = [name for name in ("density_stems_ha", "conifer_fraction", "oldest_age_years") if name in values]
+    if classes and together:
+        raise ValueError(f"initial {together[0]} = {values[together[0]]!r}: {classes[0]} is given too; one is allowed")
     biomass, held = values.get("biomass_kgc_m2", 0.0), most_biomass(values)
     if held is not None:
         stems, most = held

@@ -45,6 +45,7 @@ from sim.spin_up import (
     SOIL_CARBONS,
     SPIN_UP_STEPS_PER_DAY,
     SPIN_UP_YEARS,
+    SPIN_UP_YEARS_OF_A_RECORD,
     boundary_in_balance,
     check_initial_ranges,
     check_stocks,
@@ -237,7 +238,7 @@ class Stands:
         nothing = np.full(len(stands), NO_CHANGE)
         steps = self.steps_per_day if observed is not None else min(self.steps_per_day, SPIN_UP_STEPS_PER_DAY)
         heat_before = gain_before = None
-        for year in range(SPIN_UP_YEARS):
+        for year in range(SPIN_UP_YEARS if observed is None else SPIN_UP_YEARS_OF_A_RECORD):
             heat = self.state[stands, deep].copy()
             state, record = self._run(stands, draws, nothing, observed, steps_per_day=steps)
             self._check(stands, self.parameters[stands], state, record, "spin-up")
@@ -272,15 +273,15 @@ class Stands:
         shape (stands, days, columns of `sim.state.DAILY`).
         """
         stands = np.arange(self.number) if stands is None else self._indices(stands)
+        for stand in stands:
+            if self.seeds[stand] is None:
+                raise RuntimeError(f"stand {stand} has not been started")
         actions = check_actions(actions, len(stands))
         if positive_integer("days", days) > DAYS:
             raise ValueError(f"days = {days}: at most {DAYS} are allowed")
         if observed is not None:
             check_observed(observed, days * self.steps_per_day)
         parameters = self.parameters_of_year(stands)
-        for stand in stands:
-            if self.seeds[stand] is None:
-                raise RuntimeError(f"stand {stand} has not been started")
         once, alike = self._alike(stands, actions, parameters)
         rows = np.empty((len(once), days, len(DAILY))) if daily else None
         streams = self.streams[stands[once]]

@@ -623,6 +623,14 @@ BAD = {
 }
 
 
+def test_a_clock_of_summer_time_is_refused():
+    table = records.fluxnet()
+    summer = pd.to_datetime(table.TIMESTAMP_START.astype(str)).dt.month.isin(range(4, 11))
+    table["SW_IN_F"] = np.where(summer, table.SW_IN_F.shift(2, fill_value=0.0), table.SW_IN_F)
+    with pytest.raises(ValueError, match=r"middle of its light 0.9 hours later in summer than in winter"):
+        sim.read_forcing(table, **SWEDEN | {"utc_offset_h": 1.5})
+
+
 @pytest.mark.parametrize(("make", "message"), BAD.values(), ids=BAD)
 def test_a_bad_record_is_refused_in_one_line(make, message):
     source = make()

@@ -628,19 +628,44 @@ def test_dates_and_years_are_the_forcings():
     assert len(sim.simulate(forcing=observed())) == 1  # its steps are the forcing's, where they are longer than 30 min
 
 
-def test_latitude_and_climate_are_the_forcings_where_they_are_not_given():
+def test_the_latitude_is_the_forcings_where_it_is_not_given():
     forcing = observed()
-    forcing.attrs["site"] = {"latitude_deg": 66.0, "mean_annual_temperature_c": -3.0}
+    forcing.attrs["site"] = {"latitude_deg": 66.0}
     told = simulate(forcing=forcing)
     plain = observed()
     assert not told.equals(simulate(forcing=plain))
     plain.attrs.clear()
     pd.testing.assert_frame_equal(told, simulate(forcing.attrs["site"], forcing=plain))
-    assert not told.equals(simulate({"mean_annual_temperature_c": -9.0}, forcing=forcing))
     with pytest.raises(
         ValueError, match=r"latitude_deg = 60: the forcing is of 66, and the sun has to be that of its place"
     ):
         simulate({"latitude_deg": 60.0}, forcing=forcing)
+
+
+def test_below_whole_years_no_other_climate_has_a_part():
+    forcing = observed(air_temperature_c=observed().air_temperature_c + 2.0)  # near 0 degC balance comes late
+    ground = [
+        simulate({"mean_annual_temperature_c": mean}, forcing=forcing).deep_soil_temperature_c[0]
+        for mean in (-9.0, 3.0)
+    ]
+    assert ground[0] == pytest.approx(ground[1], abs=0.01)
+    forcing.attrs["site"] = {"latitude_deg": 60.5, "mean_annual_temperature_c": -3.0, "seasonal_amplitude_c": 17.0}
+    warmer = simulate(forcing=forcing)
+    forcing.attrs["site"] = {"latitude_deg": 60.5}
+    pd.testing.assert_frame_equal(simulate(forcing=forcing), warmer)
+    mild = observed(air_temperature_c=12.0)
+    assert simulate(forcing=mild).air_temperature_c[0] == pytest.approx(12.0)
+
+
+def test_arguments_stay_as_they_are():
+    site, initial = {"latitude_deg": 62.0}, {"density_stems_ha": 500.0}
+    simulate(site, None, hold_stand=True, initial=initial)
+    assert site == {"latitude_deg": 62.0} and initial == {"density_stems_ha": 500.0}
+
+
+def test_one_day_has_daily_values():
+    day = simulate(forcing=observed(1), output="daily")
+    assert len(day) == 1 and day.doy[0] == 1 and np.isfinite(day.gpp_kgc_m2[0])
 
 
 @pytest.mark.parametrize("initial", [{}, {"conifer_mature_stems_ha": 600.0, "deciduous_young_stems_ha": 500.0}])

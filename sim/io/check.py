@@ -68,6 +68,8 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
     if twice:
         raise ValueError(f"forcing: column {twice[0]} is there twice")
     index = forcing.index
+    if (index[0].month, index[0].day, index[0].hour, index[0].minute) != (1, 1, 0, 0):
+        raise ValueError(f"forcing starts at {index[0]}; it has to start at 00:00 of 1 January")
     interval = index[1] - index[0]
     late = index[1:][np.diff(index.to_numpy()) != interval.to_timedelta64()]
     for time in late:
@@ -91,8 +93,6 @@ def check_forcing(forcing: pd.DataFrame, time_step_minutes: int, years: int) -> 
             what = "a gap" if np.isnan(value) else f"{value:g}"
             why = f" ({hint})" if hint and not np.isnan(value) else ""
             raise ValueError(f"forcing: {name} is {what} at {at}; [{low:g}, {high:g}] {unit} is allowed{why}")
-    if (kept.index[0].month, kept.index[0].day, kept.index[0].hour, kept.index[0].minute) != (1, 1, 0, 0):
-        raise ValueError(f"forcing starts at {kept.index[0]}; it has to start at 00:00 of 1 January")
     per_day = DAY / minutes
     days = len(kept) / per_day
     if days % 1 or (days > DAYS and days % DAYS) or (days < DAYS and years > 1):

@@ -208,10 +208,9 @@ def _check_arguments(latitude_deg, longitude_deg, utc_offset_h, gaps, longest_ga
             continue
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not low <= value <= high:
             raise ValueError(f"{name} = {value!r}: a number in [{low:g}, {high:g}] is allowed")
-    if gaps not in GAPS:
-        raise ValueError(f"gaps {gaps!r}: allowed are {', '.join(GAPS)}")
-    if unusual not in UNUSUAL:
-        raise ValueError(f"unusual {unusual!r}: allowed are {', '.join(UNUSUAL)}")
+    for name, given, allowed in (("gaps", gaps, GAPS), ("unusual", unusual, UNUSUAL)):
+        if not isinstance(given, str) or given not in allowed:
+            raise ValueError(f"{name} {given!r}: allowed are {', '.join(allowed)}")
     if not isinstance(diurnal_cycle, DiurnalCycle):
         raise ValueError(f"diurnal_cycle: a sim.DiurnalCycle is allowed, got {diurnal_cycle!r}")
 

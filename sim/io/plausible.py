@@ -68,6 +68,9 @@ DEVIATIONS, LEAST_DEVIATION_K = 8.0, 5.0
 DAYLIGHT_W_M2, SUNRISE_DEG, HALF_MONTH = 5.0, 1.0, 15
 PLACE_WITHIN, PLACE_WITHIN_OF_DAYS = (5.0, 10), (9.0, 14)  # degrees of latitude, days
 TILT = np.array([declination(day) for day in range(366)])
+#: Months in which all clocks of summer time are ahead, and in which none is. Svartberget's light has its middle 0.1
+#: hours earlier in summer, Sodankylä's 0.3 later; such a clock adds 1.
+SUMMER, WINTER, SUMMER_TIME_H = (5, 6, 7, 8), (11, 12, 1, 2), 0.65
 A_YEAR = pd.date_range("2001-01-01", periods=DAYS)
 
 
@@ -87,9 +90,23 @@ def check_sun(name: str, weather: pd.DataFrame, interval: int, expected_h: float
         when = "after" if late > 0 else "before"
         raise ValueError(
             f"{name}: the record has the middle of its light {abs(late):.1f} hours {when} solar noon; {clock}, "
-            "longitude_deg, or starts that are ends of the intervals may be wrong"
+            "longitude_deg, a clock of summer time, or starts that are ends of the intervals may be wrong"
         )
+    _check_summer_time(name, weather, interval, days)
     return late
+
+
+def _check_summer_time(name: str, weather: pd.DataFrame, interval: int, days: pd.Series) -> None:
+    """Refuse a clock that is an hour ahead in summer, by the middle of the light; days : its means by date."""
+    noons = []
+    for months in (WINTER, SUMMER):
+        part = weather["shortwave"][weather.index.month.isin(months)]
+        if (days[days.index.month.isin(months)] > 20.0).sum() < FEWEST_DAYS:
+            return
+        noons.append(noon_of(part.index, interval, part.to_numpy()))
+    if None not in noons and hours_apart(noons[1], noons[0]) > SUMMER_TIME_H:
+        late = f"{hours_apart(noons[1], noons[0]):.1f} hours later in summer than in winter"
+        raise ValueError(f"{name}: the record has the middle of its light {late}; no clock of summer time is allowed")
 
 
 def in_numbers(weather: pd.DataFrame, interval: int) -> str:

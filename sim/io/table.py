@@ -130,7 +130,10 @@ def _csv(path: Path) -> Table:
     if all(re.fullmatch(r"[-+.\d][-+.:\d eTZ]*", name) for name in columns):
         raise ValueError(f"{at}: a row of column names is needed, got numbers, {', '.join(columns[:3])}")
     if len(columns) == 1 and len(columns[0].split()) > 1:
-        raise ValueError(f"{at}: columns separated by comma, semicolon or tab are allowed, got {header.strip()!r}")
+        raise ValueError(
+            f"{at}: columns separated by comma, semicolon or tab are allowed, got {header.strip()!r}; lines above the "
+            "names have to begin with #"
+        )
     twice = [name for k, name in enumerate(columns) if name in columns[:k]]
     if twice:
         raise ValueError(f"{at}: column {twice[0] or '(without a name)'} is there twice")
