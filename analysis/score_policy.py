@@ -124,7 +124,9 @@ def check(policy: protocol.Policy, folder: Path) -> str:
     objectives = fronts.objectives_of(written.columns)
     key = ["policy", *fronts.weight_columns(objectives), "seed"]
     first, second = (table.sort_values(key)[fronts.return_columns(objectives)] for table in (written, again))
-    if first.shape != second.shape or not np.allclose(first, second, atol=1e-4):
+    if first.shape != second.shape:
+        raise ValueError(f"{folder}: evaluation.csv lacks episodes of a policy, greedy or sampled, or of a weight")
+    if not np.allclose(first, second, atol=1e-4):
         raise ValueError(f"{folder}: its policy does not play what evaluation.csv says (of another physics?)")
     return f"plays its evaluation again, {len(again)} episodes"
 
@@ -155,7 +157,8 @@ def leaderboard(root: Path) -> pd.DataFrame:
     if not path.exists():
         return pd.DataFrame(columns=COLUMNS)
     try:
-        table = pd.read_csv(path)
+        # a name may be one that pandas takes for a gap
+        table = pd.read_csv(path, keep_default_na=False, na_values=dict.fromkeys(("steps", *SCORES), [""]))
     except ValueError as error:
         raise ValueError(f"{path} is damaged ({runs.in_a_line(error)})") from error
     if tuple(table) != COLUMNS:
@@ -165,7 +168,7 @@ def leaderboard(root: Path) -> pd.DataFrame:
         raise ValueError(f"{path} is damaged: its row {unscored.iloc[0]!r} lacks a score")
     if files.is_cut(path):
         raise ValueError(f"{path} is damaged: it does not end with a newline")
-    return table
+    return table.assign(steps=pd.to_numeric(table.steps).astype("Int64"))
 
 
 def check_name(name: str, args: Args) -> None:
@@ -183,6 +186,7 @@ def add(row: dict, root: Path) -> None:
     page = (root / PAGE).read_text(encoding="utf-8")
     cells = [[f"{v:.0f}" if isinstance(v, float) else str(v) for v in line] for line in table.itertuples(index=False)]
     text = SECTION.sub(lambda match: match[1] + markdown(COLUMNS, cells) + match[2], page)
+    table["steps"] = table.steps.astype("Int64")
     with protocol.replacing(root / TABLE) as file:
         table.to_csv(file, index=False, float_format="%.4g", lineterminator="\n")
     with protocol.replacing(root / PAGE) as file:
@@ -191,6 +195,8 @@ def add(row: dict, root: Path) -> None:
 
 def main(args: Args) -> None:
     """Check, score, and add."""
+    if len(set(args.tasks)) < len(args.tasks):
+        fail(f"--tasks {' '.join(args.tasks)}: each once is allowed")
     for env_id in args.tasks:
         if not ask(env_id, "--tasks").boreal:
             fail(f"--tasks {env_id}: constant plans, and so a score, are of the boreal environments alone")

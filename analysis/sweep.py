@@ -10,6 +10,7 @@ on from its checkpoint. When all are finished, a row a run is in `--output`, and
 
 import dataclasses
 import itertools
+import json
 import re
 import signal
 import sys
@@ -30,6 +31,7 @@ from analysis.tables.common import over_seeds, readable
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 from cleanrl_style.protocol.agents import load_script
+from cleanrl_style.protocol.arguments import FREE_ARGUMENTS
 from sim.block import LANES, lanes_for
 from sim.executor import HERE, RAY_HERE, NoCluster, check_address, default_address
 
@@ -70,11 +72,23 @@ class Run:
     folder: Path
     command: commands.Command
     lanes: set[int]  # of the kernels that it needs on a core
+    config: dict  # its script and arguments, as in config.json
 
     @property
     def finished(self) -> bool:
-        """Whether it need not be run."""
-        return runs.is_finished(self.folder)
+        """Whether it need not be run; exits where its folder holds a run of other arguments."""
+        if not runs.is_finished(self.folder):
+            return False
+        try:
+            config = json.loads((self.folder / "config.json").read_text(encoding="utf-8"))
+            there = {"script": config["script"], **config["arguments"]}
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            protocol.fail(f"{self.folder}: config.json is damaged ({error!r})")
+        here = json.loads(json.dumps(self.config, default=str))
+        if changed := [name for name in here if name in there and there[name] != here[name]]:
+            values = ", ".join(f"{name} {there[name]} there, {here[name]} here" for name in changed)
+            protocol.fail(f"{self.folder} holds a run with other arguments: {values} (--runs-dir names another folder)")
+        return True
 
 
 def numbers(text: str) -> list[int]:
@@ -157,10 +171,15 @@ def all_runs(args: Args) -> list[Run]:
             (str(args.script.resolve()), *words, "--run-dir", str(folder)), log, getattr(one, "total_timesteps", 0)
         )
         lanes = {lanes_for(one.num_envs, 1), LANES} if task.boreal else set()
-        found.append(Run(settings, seed, folder, command, lanes))
+        found.append(Run(settings, seed, folder, command, lanes, {"script": args.script.stem, **arguments_there(one)}))
     if len({run.folder for run in found}) < len(found):
         protocol.fail("--grid: two of its combinations are the same run")
     return found
+
+
+def arguments_there(args) -> dict:
+    """A script's arguments as its run's config.json has them."""
+    return {name: value for name, value in vars(args).items() if name not in FREE_ARGUMENTS}
 
 
 def part_of(found: list[Run], part: str) -> list[Run]:
@@ -174,7 +193,10 @@ def part_of(found: list[Run], part: str) -> list[Run]:
 def numbers_of(run: Run) -> dict[str, float]:
     """What it gained on validation sites at its end (NaN of a training too short to have been played there), and mean
     returns over the evaluation's weights and episodes, the scalarised one first."""
-    read = runs.read_run(run.folder)
+    try:
+        read = runs.read_run(run.folder)
+    except ValueError as error:
+        protocol.fail(f"{run.folder}: {error}; without the folder it is run again")
     columns = ["scalarized_return", *fronts.return_columns(fronts.objectives_of(read.evaluation.columns))]
     course = read.tables.get("validation")
     last = np.nan if course is None else course[course.global_step == course.global_step.max()].scalarized_gain.mean()

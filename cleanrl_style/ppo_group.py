@@ -245,7 +245,7 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
 if __name__ == "__main__":
     task = protocol.make_task(args, hide_site=args.hide_site)
     if args.num_envs == 1 and 1 in (args.rollout_steps, args.total_timesteps % args.rollout_steps):
-        protocol.fail(f"--total-timesteps {args.total_timesteps}: a rollout of one step has no deviation to divide by")
+        protocol.fail("--rollout-steps, --total-timesteps: a rollout of 1 step has no deviation to divide by")
     if task.fixes_preference:
         protocol.fail(f"--env-id {args.env_id}: it has a fixed_preference, and a group is spread over all")
     episode_columns = task.episode_columns
@@ -333,7 +333,7 @@ if __name__ == "__main__":
                 next_done = terminations | truncations
                 ended = next_done.reshape(num_groups, args.group_size)
                 if (ended != ended[:, :1]).any():
-                    protocol.fail(f"--env-id {args.env_id}: the episodes of a group must be of one length")
+                    protocol.fail("--group-size: the episodes of a group must be of one length; 1 is allowed")
                 # ALGO LOGIC: a preference is kept to the end of its episode, then each group draws others
                 next_obs[:, : num_values - 1] = preferences[:, :-1]
                 drawn = spread_preferences(ended[:, 0].sum(), args.group_size, num_values)

@@ -89,6 +89,12 @@ def test_a_policy_is_watched(shipped, tmp_path, capsys, monkeypatch):
     assert "carbon weight 0.30: return" in out and "doing nothing" in out and ": 4 years" in out
 
 
+def test_a_folder_without_a_policy_hides_none_that_ships(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ppo_group").mkdir()
+    assert flags.policy_file("ppo_group") == flags.shipped_policies()["ppo_group"]
+
+
 def test_what_shows_other_years_has_another_name(run):
     def name(*given, policy="ppo_group"):
         args = command_line.arguments(["watch", str(policy), *given])
@@ -145,6 +151,10 @@ def test_an_environment_that_draws_nothing_cannot_be_watched(run, monkeypatch):
         (["watch", "{run}", "--site-seed", "-1"], r"--site-seed: an integer in \[0, 2\^63\) is allowed, got -1"),
         (["watch", "{run}", "--script", "x.md"], "--script x.md: a file that ends in .py, and is there, is allowed"),
         (["watch", "{run}", "--script", flags.__file__], "flags.py: it has no Agent and no make_policy"),
+        (
+            ["watch", "ppo_group", "--script", str(ROOT / "cleanrl_style" / "ppo_gated.py")],
+            "trained by a script of the name ppo_group.py",
+        ),
         (["watch", __file__], "no policy that a script of this project has written"),
         (["wach"], "invalid choice: 'wach'"),
     ],
@@ -301,6 +311,20 @@ def test_a_bad_flag_is_answered_before_torch_is_loaded(command):
     said = subprocess.run([sys.executable, "-X", "importtime", *command], capture_output=True, text=True, cwd=ROOT)
     assert said.stderr.splitlines()[-1].startswith("error: nobody: neither")
     assert "| torch\n" not in said.stderr
+
+
+def test_a_row_may_have_any_name_and_no_steps(tmp_path):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / score_policy.PAGE).write_text("<!-- leaderboard -->\n<!-- end of leaderboard -->\n", encoding="utf-8")
+    scores = dict.fromkeys(score_policy.SCORES, 50.0)
+    for name, steps in (("NA", None), ("one", 1_234_567), ("NA", 300_000)):
+        row = {"name": name, "script": "ppo", "trained on": "boreal-balanced-v0", "steps": steps}
+        score_policy.add(row | scores, tmp_path)
+    lines = (tmp_path / score_policy.TABLE).read_text(encoding="utf-8").splitlines()[1:]
+    assert [line.split(",")[:4] for line in lines] == [
+        ["NA", "ppo", "boreal-balanced-v0", "300000"],
+        ["one", "ppo", "boreal-balanced-v0", "1234567"],
+    ]
 
 
 def test_rows_go_into_the_leaderboard(tmp_path):

@@ -1,5 +1,6 @@
 """A sweep's runs, their table, and what of it a job array does."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -21,6 +22,14 @@ def args(folder, seeds="1-2", grid=("learning_rate=1e-4,3e-4",), script=SCRIPT, 
     return sweep.Args(script, seeds, tuple(grid), "none", runs_dir=folder, output=folder / "sweep.csv", **changes)
 
 
+@pytest.fixture(autouse=True)
+def small_evaluations(monkeypatch):
+    """What `write_run` writes has fewer episodes and weights than the scripts' own evaluation."""
+    theirs = sweep.arguments_there
+    here = lambda one: {name: value for name, value in theirs(one).items() if not name.startswith("eval_")}  # noqa: E731
+    monkeypatch.setattr(sweep, "arguments_there", here)
+
+
 def finish(runs, shift=0.0):
     """Runs as if they had been trained; those of the larger learning rate are better by 1 on test sites, and worse on
     those of the validation."""
@@ -28,6 +37,10 @@ def finish(runs, shift=0.0):
         better = float(run.settings.get("learning_rate") == "3e-4")
         returns = (better + 0.1 * run.seed + shift,) * 3
         write_run(run.folder, "ppo_group", seed=run.seed, carbon=returns, thaw=returns)
+        config = run.folder / "config.json"
+        there = json.loads(config.read_text())
+        there["arguments"] |= {name: value for name, value in run.config.items() if name != "script"}
+        config.write_text(json.dumps(there))
         gains = {"global_step": (1, 2, 2), "preference": (0.0, 0.0, 1.0), "scalarized_gain": (9.0, 1.0, 3.0 - better)}
         pd.DataFrame(gains).to_csv(run.folder / "validation.csv", index=False)
 
@@ -71,6 +84,26 @@ def test_finished_runs_are_skipped_and_a_table_made(tmp_path, capsys, monkeypatc
     best, worst = capsys.readouterr().out.splitlines()[-3:-1]
     assert best.split()[:2] == ["1e-4", "2"] and worst.split()[:2] == ["3e-4", "2"]  # chosen on validation sites
     assert table.validation_gain.tolist() == [2.0, 1.5, 2.0, 1.5]
+
+
+def test_a_finished_run_of_other_arguments_is_not_taken_for_ours(tmp_path):
+    finish(runs := sweep.all_runs(args(tmp_path)))
+    config = json.loads((runs[0].folder / "config.json").read_text())
+    config["arguments"]["gamma"] = 0.5
+    (runs[0].folder / "config.json").write_text(json.dumps(config))
+    with pytest.raises(SystemExit, match=r"holds a run with other arguments: gamma 0.5 there, 1.0 here"):
+        sweep.main(args(tmp_path))
+    (runs[0].folder / "config.json").write_text("{}")
+    with pytest.raises(SystemExit, match=r"config.json is damaged"):
+        sweep.main(args(tmp_path))
+
+
+def test_a_damaged_table_is_named_with_its_folder(tmp_path):
+    finish(runs := sweep.all_runs(args(tmp_path)))
+    evaluation = runs[1].folder / "evaluation.csv"
+    evaluation.write_bytes(evaluation.read_bytes()[:300])
+    with pytest.raises(SystemExit, match=f"{runs[1].folder}: damaged: evaluation.csv does not end"):
+        sweep.main(args(tmp_path))
 
 
 def test_trainings_too_short_for_validation_are_not_ranked(tmp_path, capsys):

@@ -9,6 +9,7 @@ from toy_env import ToyEnv, ToyVectorEnv
 
 import boreal_env
 from cleanrl_style import protocol
+from cleanrl_style.protocol import task as asked
 from cleanrl_style.protocol import training_envs
 from sim.block import lanes_for
 from sim.stands import available_cores
@@ -113,6 +114,16 @@ def test_an_observation_without_the_preference_is_for_a_fixed_one_alone(tmp_path
     assert not protocol.Task.of("no-preference-v0").observes_preference
     with pytest.raises(SystemExit, match="its observation lacks the preference"):
         run_script("cleanrl_style/ppo_gated.py", "--env-id", "no-preference-v0", "--run-dir", tmp_path / "run")
+
+
+class OfThree(gym.Wrapper):
+    """Another number of objectives than what it wraps."""
+
+    reward_dim, objective_names = 3, ("x", "y", "z")
+
+
+def test_a_wrappers_own_objectives_count():
+    assert asked._check_spaces(OfThree(gym.make("boreal-generalist-v0"))) == ("x", "y", "z")
 
 
 def test_objectives_have_names():

@@ -36,7 +36,7 @@ class ValidActions(gym.spaces.Discrete):
 
     def sample(self, mask=None, probability=None):
         """An action that can be carried out in full."""
-        return super().sample(mask=self.env.unwrapped.action_masks().astype(np.int8))
+        return super().sample(mask=self.env.get_wrapper_attr("action_masks")().astype(np.int8))
 
 
 class Env(gym.Wrapper):
@@ -78,7 +78,7 @@ class Env(gym.Wrapper):
 
     def action_masks(self) -> np.ndarray:
         """Valid actions, bool (25,)."""
-        return self.env.unwrapped.action_masks()
+        return self.env.get_wrapper_attr("action_masks")()
 
 
 class NoEnv(gym.Env):

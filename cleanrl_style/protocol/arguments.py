@@ -75,7 +75,9 @@ def make_task(args, *, preference=None, hide_site: bool = False) -> Task:
     if not weights or len(set(weights)) < len(weights):
         given = " ".join(str(weight) for weight in args.eval_weights)
         fail(f"--eval-weights {given}: at least one weight, and none twice, is allowed")
-    for package in getattr(args, "track", ()):
+    if len(set(tracked := getattr(args, "track", ()))) < len(tracked):
+        fail(f"--track {' '.join(tracked)}: each once is allowed")
+    for package in tracked:
         if importlib.util.find_spec(package) is None:
             fail(f"--track {package}: the package is not installed (pip install {package})")
     scalarization = getattr(args, "scalarization", "linear")

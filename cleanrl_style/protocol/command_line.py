@@ -151,6 +151,8 @@ def make_env(policy: Policy, env_id: str | None, site_seed: int | None) -> gym.E
         )
     if "rgb_array" not in (env.metadata or {}).get("render_modes", []):
         raise ValueError(f"{env.spec.id} draws no pictures: its metadata['render_modes'] lacks 'rgb_array'")
+    if site_seed is not None and not isinstance(env.unwrapped, boreal_env.BorealEnv):
+        raise ValueError(f"--site-seed is for boreal environments, not for {env.spec.id}")
     return make(render_mode="rgb_array", **({} if site_seed is None else {"site_seed": site_seed}))
 
 
@@ -162,7 +164,7 @@ def play(env: gym.Env, policy, seed: int, weights: np.ndarray):
     observation, _ = env.reset(seed=seed, options={"preference": as_option(weights)})
     frames, returns, ended = [env.render()], np.zeros(len(weights)), False
     while not ended:
-        action = policy(observation, env.unwrapped.action_masks(), returns)
+        action = policy(observation, env.get_wrapper_attr("action_masks")(), returns)
         observation, reward, terminated, truncated, _ = env.step(action)
         returns, ended = returns + reward, terminated or truncated
         frames.append(env.render())
@@ -207,7 +209,8 @@ def watch(args: argparse.Namespace) -> None:
     own = None if trained_for is None else np.ravel(trained_for).tolist()
     weights = check_preference(args.preference or own, len(objectives))
     generator = np.random.default_rng([args.seed, 1]) if args.sampled else None
-    compile_physics([1])
+    if isinstance(env.unwrapped, boreal_env.BorealEnv):
+        compile_physics([1])
     frames, returns = play(env, lambda *given: policy.act(*given, generator=generator), args.seed, weights)
     print(f"{policy.name} on {env_id}")
     if own is not None and not np.allclose(weights, check_preference(own, len(objectives))):

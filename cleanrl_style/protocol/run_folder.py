@@ -56,6 +56,7 @@ RESULTS = (
     "updates.csv",
     "validation.csv",
     "evaluation_years.csv",
+    "cost.csv",
     "summary.png",
 )
 # Steps between checkpoints, at least: counted in steps, since by the clock the last one would differ each time.

@@ -48,7 +48,7 @@ class Task:
         env = gym.make(env_id, disable_env_checker=True, **env_kwargs)
         one = env.unwrapped
         objectives = _check_spaces(env)
-        names, width = getattr(one, "observation_names", ()), len(env.observation_space.low)
+        names, width = attribute(env, "observation_names", ()), len(env.observation_space.low)
         if len(names) != width:  # a wrapper's, or another's; laid out like ours, its last entries are a site
             names = boreal_env.OBSERVATION_NAMES if width == len(boreal_env.OBSERVATION_NAMES) else ()
         bare = type(env.env if isinstance(env, OrderEnforcing) else env) is boreal_env.BorealEnv
@@ -198,6 +198,11 @@ def final_info(infos: dict, i: int, keys=("site_seed", *EPISODE_INFO)) -> dict:
     return {key: of_one(info[key]) for key in keys if key in info}
 
 
+def attribute(env: gym.Env, name: str, default=None):
+    """What an environment, or a wrapper of it, has under that name."""
+    return env.get_wrapper_attr(name) if env.has_wrapper_attr(name) else default
+
+
 def _check_rewards(whose: str, rewards, shape: tuple[int, ...]) -> None:
     """ValueError for rewards of another shape, which numpy might spread over all objectives."""
     if np.shape(rewards) != shape:
@@ -206,16 +211,16 @@ def _check_rewards(whose: str, rewards, shape: tuple[int, ...]) -> None:
 
 def _check_spaces(env: gym.Env) -> tuple[str, ...]:
     """The environment's objectives; ValueError if its spaces are not those that the scripts know."""
-    space, actions, one = env.observation_space, env.action_space, env.unwrapped
+    space, actions = env.observation_space, env.action_space
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
         raise ValueError(f"observations must be a Box of one dimension, not {space}")
     if not isinstance(actions, gym.spaces.Discrete) or actions.n != 25:
         raise ValueError(f"actions must be Discrete(25), not {actions}")
-    number = getattr(one, "reward_dim", None)
-    if not isinstance(number, (int, np.integer)) or number < 2 or not hasattr(one, "action_masks"):
+    number = attribute(env, "reward_dim")
+    if not isinstance(number, (int, np.integer)) or number < 2 or not env.has_wrapper_attr("action_masks"):
         raise ValueError("the environment needs reward_dim, 2 or more, and action_masks()")
     unnamed = ("carbon", "thaw") if number == 2 else tuple(f"objective_{k}" for k in range(1, number + 1))
-    names = tuple(getattr(one, "objective_names", unnamed))
+    names = tuple(attribute(env, "objective_names", unnamed))
     if len(names) != number or len(set(names)) < number or "scalarized" in names:
         raise ValueError(f"objective_names must be {number} different names, none of them scalarized, not {names}")
     return names

@@ -35,7 +35,7 @@ def tensorboard(args, script, folder, config, first_step):
     """Event files in <run>/tensorboard."""
     from torch.utils.tensorboard import SummaryWriter
 
-    purged = first_step + 1 if first_step else None
+    purged = first_step + 1 if first_step else 0  # what an earlier process wrote beyond its last checkpoint
     writer = SummaryWriter(str(folder / "tensorboard"), purge_step=purged, flush_secs=1)  # what a kill may lose
     atexit.register(writer.close)  # its thread ends with the program, and with it what is not yet written
 
