@@ -233,9 +233,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `scenario`: None, or climate change from the first year, 2025, on: "ssp126", "ssp245" (`boreal-warming-v0`) or
       "ssp585", to 2100, or a dict or DataFrame with a value a year of any of `warming_k`, `warming_amplitude_k` (on the
       warmest day; below 0, winters warm more), `precipitation_factor` and `co2_ppm`, from 2025 on or beside its years
-      (a column `year`, the index, or the keys of a dict in a
-      column's place). It is not observed, but the year is, and the path is the same in
-      every episode; the climate that is observed stays the site's own
+      (a column `year`, the index, or the keys of a dict in a column's place). It is not observed, but the year is,
+      and the path is the same in every episode; the climate that is observed stays the site's own
     - `objectives`: of the reward vector, "carbon", "thaw", "active_layer", "permafrost_heat", "timber", "biodiversity"
       and any `Objective` of your own
     - `timber`: prices and costs, which "timber" needs: "finland", "sweden" or "canada" of `sim/timber_prices.csv`, a

@@ -254,11 +254,13 @@ def variants(seeds) -> list[Job]:
 
 
 def budgets(seeds) -> list[Job]:
-    """Group PPO with a third of the budget, and with three times and a bit of it; the main table has the whole."""
+    """Group PPO with a third of the budget, with three times and a bit of it, and with ten times."""
     changes = (
         (5, {"total_timesteps": 100_000}),
         (10, {"total_timesteps": 1_000_000}),  # rows of the README, as those of the main table
         (10, {"total_timesteps": 1_000_000, "env_id": BALANCED}),
+        (3, {"total_timesteps": 3_000_000}),
+        (3, {"total_timesteps": 3_000_000, "env_id": BALANCED}),
     )
     return [
         trained("budgets", "ppo_group", seed, **change)
@@ -298,7 +300,7 @@ EXPERIMENTS = {
     "variants": Experiment(variants, "gated PPO and EUPG with one choice changed"),
     "mechanisms": Experiment(mechanisms, "physical conflicts, counterfactual pairs, warming of selected sites"),
     "difficulty": Experiment(difficulty, "why thaw is hard to learn: noise of actions and gradients"),
-    "budgets": Experiment(budgets, "group PPO with 100,000 and 1,000,000 steps"),
+    "budgets": Experiment(budgets, "group PPO with 100,000, 1,000,000 and 3,000,000 steps"),
 }
 
 

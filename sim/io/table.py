@@ -48,7 +48,8 @@ class Table:
         if wrong.any():
             row = int(np.argmax(wrong))
             comma = " with a decimal point" if re.fullmatch(r"[+-]?\d+,\d+", str(texts.iloc[row])) else ""
-            raise ValueError(f"{self.where(row)}: {name} is {texts.iloc[row]!r}; a number{comma} is allowed")
+            allowed = f"a number{comma} is allowed, and for a gap nothing, NA, NaN or -9999"
+            raise ValueError(f"{self.where(row)}: {name} is {texts.iloc[row]!r}; {allowed}")
         return np.where(values <= NO_NUMBER, np.nan, values)
 
 
