@@ -37,6 +37,9 @@ def there(folder: Path) -> Path:
 
 def make_writable(flag: str, folder: Path) -> None:
     """Make a folder before anything is computed; a flag's that cannot be written to ends the script with one line."""
+    file = next((path for path in (folder, *folder.parents) if path.is_file()), None)
+    if file is not None:
+        fail(f"{flag} {folder}: cannot write there ({file} is a file)")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):

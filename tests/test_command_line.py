@@ -382,5 +382,5 @@ def test_where_nothing_can_be_written_nothing_is_computed(command, given, tmp_pa
     monkeypatch.chdir(tmp_path)
     Path("file").touch()
     given = {name: Path(value) if isinstance(value, str) else value for name, value in given.items()}
-    with pytest.raises(SystemExit, match=r"^error: --\w+ file: cannot write there \(File exists\)$"):
+    with pytest.raises(SystemExit, match=r"^error: --\w+ file: cannot write there \(file is a file\)$"):
         command.main(command.Args(**given))
