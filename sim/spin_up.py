@@ -94,7 +94,7 @@ def check_initial(values: dict | None, limits=INITIAL_LIMITS) -> dict[str, float
     classes = [name for name in values if name in CLASS_NAMES]
     together = [name for name in ("density_stems_ha", "conifer_fraction", "oldest_age_years") if name in values]
     if classes and together:
-        raise ValueError(f"initial {together[0]} = {values[together[0]]!r}: {classes[0]} is given too; one is allowed")
+        raise ValueError(f"initial {together[0]} = {values[together[0]]:g}: {classes[0]} is given too; one is allowed")
     biomass, held = values.get("biomass_kgc_m2", 0.0), most_biomass(values)
     if held is not None:
         stems, most = held

@@ -151,10 +151,6 @@ def test_an_environment_that_draws_nothing_cannot_be_watched(run, monkeypatch):
         (["watch", "{run}", "--site-seed", "-1"], r"--site-seed: an integer in \[0, 2\^63\) is allowed, got -1"),
         (["watch", "{run}", "--script", "x.md"], "--script x.md: a file that ends in .py, and is there, is allowed"),
         (["watch", "{run}", "--script", flags.__file__], "flags.py: it has no Agent and no make_policy"),
-        (
-            ["watch", "ppo_group", "--script", str(ROOT / "cleanrl_style" / "ppo_gated.py")],
-            "trained by a script of the name ppo_group.py",
-        ),
         (["watch", __file__], "no policy that a script of this project has written"),
         (["wach"], "invalid choice: 'wach'"),
     ],

@@ -259,7 +259,10 @@ def test_chunks_are_of_one_size_and_bounded():
             {"deep_boundary_temperature_k": [270.0, 271.0]},
             "sites: column deep_boundary_temperature_k: boundary='balanced' finds it",
         ),
-        ({"conifer_old_stems_ha": [1.0, 1.0], "density_stems_ha": [1.0, 1.0]}, "stems by class exclude density"),
+        (
+            {"conifer_old_stems_ha": [1.0, 1.0], "density_stems_ha": [1.0, 1.0]},
+            "density_stems_ha = 1: conifer_old_stems_ha is given too",
+        ),
         (
             {"density_stems_ha": [400.0, 0.0], "biomass_kgc_m2": 4.0},
             "zero-based row 1, column biomass_kgc_m2 is 4; of 0 stems/ha at most 0 kgC/m2 is allowed",

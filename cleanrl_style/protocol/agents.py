@@ -135,8 +135,6 @@ def load_policy(run_or_name, script=None) -> Policy:
     lacking = [part for part in ("Agent", "make_policy") if not hasattr(module, part)]
     if lacking:
         raise ValueError(f"{module.__file__}: it has no {' and no '.join(lacking)}, so it trained no policy")
-    if Path(module.__file__ or "").stem != run["script"]:
-        raise ValueError(f"script {script}: {path} was trained by a script of the name {run['script']}.py")
     try:
         with torch.random.fork_rng(devices=[]):  # its first weights are drawn and thrown away
             agent = module.Agent(envs, **saved["arguments"])

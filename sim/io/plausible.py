@@ -98,15 +98,16 @@ def check_sun(name: str, weather: pd.DataFrame, interval: int, expected_h: float
 
 def _check_summer_time(name: str, weather: pd.DataFrame, interval: int, days: pd.Series) -> None:
     """Refuse a clock that is an hour ahead in summer, by the middle of the light; days : its means by date."""
-    noons = []
+    parts = []
     for months in (WINTER, SUMMER):
-        part = weather["shortwave"][weather.index.month.isin(months)]
         if (days[days.index.month.isin(months)] > 20.0).sum() < FEWEST_DAYS:
             return
-        noons.append(noon_of(part.index, interval, part.to_numpy()))
-    if None not in noons and hours_apart(noons[1], noons[0]) > SUMMER_TIME_H:
-        late = f"{hours_apart(noons[1], noons[0]):.1f} hours later in summer than in winter"
-        raise ValueError(f"{name}: the record has the middle of its light {late}; no clock of summer time is allowed")
+        parts.append(weather["shortwave"][weather.index.month.isin(months)])
+    winter, summer = (noon_of(part.index, interval, part.to_numpy()) for part in parts)
+    if winter is None or summer is None or hours_apart(summer, winter) <= SUMMER_TIME_H:
+        return
+    late = f"{hours_apart(summer, winter):.1f} hours later in summer than in winter"
+    raise ValueError(f"{name}: the record has the middle of its light {late}; no clock of summer time is allowed")
 
 
 def in_numbers(weather: pd.DataFrame, interval: int) -> str:
