@@ -227,8 +227,8 @@ def paragraph(results, env_id: str) -> str:
         scores = f"{methods.title(LEARNED[-1])} scores {shown(its)}, {side}"
         budget = f"With {MORE_STEPS:,} steps and {of_seeds(longer)}"
         of_these_sites = points(longer, best_plans, best_plans)
-        ahead += f" {budget} {scores}, where every drawn set of sites has its own best plans."
-        ahead += f" Less the best plans of just these sites it is {of_these_sites}."
+        ahead += f" {budget} {scores}. There every drawn set of sites has best plans of its own, which are its 100."
+        ahead += f" With those of all sites kept, it gains {of_these_sites} points more than they do."
     few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]
     if few:
         ahead += f" Few training seeds: {listed([f'{methods.title(*method)} {len(rows[method])}' for method in few])}."

@@ -32,6 +32,7 @@ from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 from cleanrl_style.protocol.agents import load_script
 from cleanrl_style.protocol.arguments import FREE_ARGUMENTS
+from cleanrl_style.protocol.run_folder import differences
 from sim.block import LANES, lanes_for
 from sim.executor import HERE, RAY_HERE, NoCluster, check_address, default_address
 
@@ -85,9 +86,11 @@ class Run:
         except (OSError, ValueError, KeyError, TypeError) as error:
             protocol.fail(f"{self.folder}: config.json is damaged ({error!r})")
         here = json.loads(json.dumps(self.config, default=str))
-        if changed := [name for name in here if name in there and there[name] != here[name]]:
-            values = ", ".join(f"{name} {there[name]} there, {here[name]} here" for name in changed)
-            protocol.fail(f"{self.folder} holds a run with other arguments: {values} (--runs-dir names another folder)")
+        known = {name: there[name] for name in here if name in there}  # a script may have got more flags since
+        if changed := differences(known, {name: here[name] for name in known}):
+            protocol.fail(
+                f"{self.folder} holds a run with other arguments: {changed} (--runs-dir names another folder)"
+            )
         return True
 
 

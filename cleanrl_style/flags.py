@@ -97,8 +97,8 @@ def policy_file(run_or_name) -> Path:
         raise ValueError(f"policy {run_or_name!r}: a run's folder, a file, or the name of one that ships is allowed")
     path, ships = Path(run_or_name), shipped_policies()
     if os.path.isdir(path):  # a name too long for the file system is no folder; Path's own would raise
-        path = ships.get(str(run_or_name), path) if not os.path.isfile(path / POLICY) else path / POLICY
-    elif not os.path.exists(path):
+        path = path / POLICY
+    if not os.path.exists(path):
         path = ships.get(str(run_or_name), path)
     if not os.path.isfile(path):
         raise FileNotFoundError(

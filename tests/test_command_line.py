@@ -1,5 +1,6 @@
 """`python -m boreal_env`, policies by name, and the commands that ship and score them."""
 
+import contextlib
 import json
 import pickle
 import re
@@ -9,6 +10,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import gymnasium as gym
 import matplotlib
 import numpy as np
 import pandas as pd
@@ -93,6 +95,20 @@ def test_a_folder_without_a_policy_hides_none_that_ships(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "ppo_group").mkdir()
     assert flags.policy_file("ppo_group") == flags.shipped_policies()["ppo_group"]
+
+
+class OnlyFour(gym.Wrapper):
+    """Allows action 4 alone."""
+
+    def action_masks(self):
+        return np.arange(25) == 4
+
+
+def test_a_wrappers_masks_are_those_that_count():
+    with contextlib.closing(OnlyFour(gym.make("boreal-site-specific-v0", render_mode="rgb_array", years=1))) as env:
+        masks = []
+        command_line.play(env, lambda seen, mask, returns: masks.append(mask) or 4, 0, np.array([0.5, 0.5]))
+    assert [np.flatnonzero(mask).tolist() for mask in masks] == [[4]]
 
 
 def test_what_shows_other_years_has_another_name(run):

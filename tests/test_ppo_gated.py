@@ -125,6 +125,11 @@ def test_learns_the_toy(tmp_path):
     assert all(returns[weight] > 0.95 * optimal_return(weight) for weight in (0.0, 0.5, 1.0))
 
 
+def test_a_tracker_is_allowed_once(tmp_path):
+    with pytest.raises(SystemExit, match="--track tensorboard tensorboard: each once is allowed"):
+        run_script("cleanrl_style/ppo_gated.py", "--track", "tensorboard", "tensorboard", "--run-dir", tmp_path / "run")
+
+
 def test_tracking_without_the_package_is_refused(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "wandb", None)
     with pytest.raises(SystemExit, match="--track wandb: the package is not installed"):

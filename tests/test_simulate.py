@@ -643,7 +643,7 @@ def test_the_latitude_is_the_forcings_where_it_is_not_given():
 
 
 def test_below_whole_years_no_other_climate_has_a_part():
-    forcing = observed(air_temperature_c=observed().air_temperature_c + 2.0)  # near 0 degC balance comes late
+    forcing = observed(air_temperature_c=observed().air_temperature_c - 2.0)  # near 0 degC balance comes late
     ground = [
         simulate({"mean_annual_temperature_c": mean}, forcing=forcing).deep_soil_temperature_c[0]
         for mean in (-9.0, 3.0)

@@ -26,8 +26,11 @@ def args(folder, seeds="1-2", grid=("learning_rate=1e-4,3e-4",), script=SCRIPT, 
 def small_evaluations(monkeypatch):
     """What `write_run` writes has fewer episodes and weights than the scripts' own evaluation."""
     theirs = sweep.arguments_there
-    here = lambda one: {name: value for name, value in theirs(one).items() if not name.startswith("eval_")}  # noqa: E731
-    monkeypatch.setattr(sweep, "arguments_there", here)
+
+    def without(one):
+        return {name: value for name, value in theirs(one).items() if not name.startswith("eval_")}
+
+    monkeypatch.setattr(sweep, "arguments_there", without)
 
 
 def finish(runs, shift=0.0):
@@ -91,7 +94,7 @@ def test_a_finished_run_of_other_arguments_is_not_taken_for_ours(tmp_path):
     config = json.loads((runs[0].folder / "config.json").read_text())
     config["arguments"]["gamma"] = 0.5
     (runs[0].folder / "config.json").write_text(json.dumps(config))
-    with pytest.raises(SystemExit, match=r"holds a run with other arguments: gamma 0.5 there, 1.0 here"):
+    with pytest.raises(SystemExit, match=r"holds a run with other arguments: gamma 0.5 there, 1.0 now"):
         sweep.main(args(tmp_path))
     (runs[0].folder / "config.json").write_text("{}")
     with pytest.raises(SystemExit, match=r"config.json is damaged"):
