@@ -282,13 +282,13 @@ def towers() -> str:
     first, second = (scores(page, tower) for tower in TOWERS)
     header = ["monthly means", *(f"{tower}: {name.split()[-1]}" for tower in TOWERS for name in SCORES)]
     table = markdown(header, [[name, *first[name], *second[name]] for name in first])
-    return f"{table}\n{misses(page)} values of that page miss, and are listed at its end.\n"
+    return f"{table}\n{misses(page)} entries of that page miss, and are listed at its end.\n"
 
 
 def missing() -> str:
     """The README's line on what misses."""
     count = misses(VALIDATION.read_text(encoding="utf-8"))
     return (
-        f"- Against towers, field experiments and observed ranges {count} values miss, listed at the end of "
-        "[docs/validation.md](docs/validation.md).\n"
+        f"- {count} entries of [docs/validation.md](docs/validation.md), listed at its end, miss what was measured or "
+        "published.\n"
     )

@@ -359,6 +359,13 @@ class Stands:
         for name in ARRAYS:
             low, high = (0, MOST_YEARS) if name == "years" else (-np.inf, np.inf)  # any bits are a stream's
             check_array(f"{what}: {name}", state[name], getattr(self, name), low, high)
+        names = [*STATE_NAMES, *["stems"] * (STATE_SIZE - len(STATE_NAMES))]
+        signed = [name in STATE and STATE[name][0] in ("degC", "J m-2") for name in names]
+        wrong = np.argwhere((state["state"] < 0.0) & ~np.array(signed))
+        if wrong.size:
+            stand, column = wrong[0]
+            value = state["state"][stand, column]
+            raise ValueError(f"{what}: {names[column]}: 0 or more is allowed, got {value:g} in stand {stand}")
         if not isinstance(state["seeds"], list) or len(state["seeds"]) != self.number:
             raise ValueError(f"{what}: seeds: a list of {self.number} is allowed, got {brief(state['seeds'])}")
         for seeds, row, streams in zip(state["seeds"], state["parameters"], state["streams"], strict=True):

@@ -108,6 +108,7 @@ def test_the_state_of_one_with_other_arguments_is_refused(arguments):
         ("stands", "parameters", np.nan, "stands: parameters: finite numbers are allowed, got nan"),
         ("stands", "parameters", 1e30, "latitude_deg = 1e.30 is outside its physical limits"),
         ("stands", "state", np.inf, "stands: state: finite numbers are allowed, got inf"),
+        ("stands", "state", -1.0, "stands: conifer_biomass: 0 or more is allowed, got -1 in stand 0"),
         ("stands", "years", -1, r"stands: years: \[0, 5000\] is allowed, got -1"),
         ("episodes", "weights", -1.0, r"episodes: weights: \[0, 1\] is allowed, got -1"),
         ("episodes", "year", 99, r"episodes: year: \[0, \d\] is allowed, got 99"),

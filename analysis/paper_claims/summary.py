@@ -72,8 +72,8 @@ SENTENCES = (
         asymmetry.physics_hides_thaw,
         asymmetry.MISSED,
         "On a single site thaw is not learnt even with a baseline: its delay is enough to hide it",
-        "What hides thaw is not its delay: on a single site the same agents learn it once eight episodes share an "
-        "update and their mean is taken off",
+        "Delay alone does not hide thaw: on single sites the same agents learn what a constant plan gains of it once "
+        "eight episodes share an update and their mean is taken off",
         "Whether delay alone hides thaw is open",
     ),
     Sentence(
@@ -92,11 +92,10 @@ SENTENCES = (
         "Stems and permafrost: part of what the paper says is open",
     ),
     Sentence(
-        paper_itself.hypervolumes,
-        "hypervolume, Curriculum PPO",
-        "The paper's hypervolumes follow from its table of detailed objectives",
-        "The paper's hypervolumes do not follow from its own table of detailed objectives, if they are of mean returns",
-        "The paper's hypervolumes cannot be checked",
+        paper_itself.heuristic_hypervolumes,
+        "hypervolume, Zero change (scalarised −2.5)",
+        *("The paper does not say what its hypervolumes are of; those of its heuristics cannot be of mean returns",)
+        * 3,
     ),
 )
 

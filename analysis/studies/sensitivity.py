@@ -293,7 +293,7 @@ Published values other than ours, and ours with the crowns of both species alike
 
 ## The {TOP} constants that move the conflict most
 
-By `|species_carbon| + |species_thaw|`: which species the objectives want.
+By `|species_carbon| + |species_thaw|`: which species the objectives want. Their order is not to be read.
 
 {markdown(by_size(moved[constant], conflict).head(TOP))}
 

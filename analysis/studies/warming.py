@@ -275,7 +275,7 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         "deep where the ground stays frozen: the boundary works against that, so it is no explanation, and we count "
         "it as a miss. Peng et al. have all permafrost, most of it north of these sites, and Stefan's equation; what "
         "makes the difference has not been tested. More sites are lost than Peng et al. lose of their area, and fewer "
-        "than in the middle of the IPCC's ranges.",
+        "than the middle of the IPCC's range under SSP1-2.6 and than its whole range under SSP5-8.5.",
         "**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of no change and of the best "
         "plan for thaw alone, for both alike and for carbon alone; the share of sites whose best plan for both is "
         "another one than without a scenario; and the share of years, of all plans, in which the thaw reward is "
