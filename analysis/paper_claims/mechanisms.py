@@ -357,8 +357,8 @@ def interception_adds(evidence, pair: str) -> Number:
     "Section 1; table of physical conflicts",
     STUDY,
     why="The rows say which parts have the other sign. The denser first stand starts with more; it gains "
-    "less, but not so much less, and still stores more after fifty years: the carbon return counts what is gained alone. "
-    "Planting stores more.",
+    "less, but not so much less, and still stores more after fifty years: the carbon return counts what is gained "
+    "alone. Planting stores more.",
     note="By its introduction less snow on the ground lets the cold in, and large gains of energy in summer can "
     "overwhelm that; its table calls the conflict complex.",
 )
