@@ -367,6 +367,7 @@ if __name__ == "__main__":
                 # TRY NOT TO MODIFY: execute the game and log data.
                 preferences = protocol.observed_weights(next_obs, task.num_objectives)
                 env_start = time.perf_counter()
+                # SAME_STEP autoreset: after an end next_obs is already the next episode's first
                 next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
                 env_seconds += time.perf_counter() - env_start
                 next_done = terminations | truncations

@@ -328,6 +328,7 @@ if __name__ == "__main__":
                 # TRY NOT TO MODIFY: execute the game and log data.
                 preferences = protocol.observed_weights(next_obs, task.num_objectives)
                 env_start = time.perf_counter()
+                # SAME_STEP autoreset: after an end next_obs is already the next episode's first
                 next_obs, reward, terminations, truncations, infos = envs.step(action.numpy())
                 env_seconds += time.perf_counter() - env_start
                 next_done = terminations | truncations
@@ -373,9 +374,9 @@ if __name__ == "__main__":
             with torch.no_grad():
                 next_value = agent.get_value(torch.Tensor(next_obs))
             last_done = torch.from_numpy(next_done).float()[:, None]
-            gained = less_the_others(rewards, args.group_size)
+            excess = less_the_others(rewards, args.group_size)
             lambdas = torch.tensor(gae_lambda)
-            advantages = compute_gae(gained, values, dones, next_value, last_done, args.gamma, lambdas)
+            advantages = compute_gae(excess, values, dones, next_value, last_done, args.gamma, lambdas)
             returns = advantages + values
             share = 1.0 if iteration == 1 else 0.1
             agent.value_mean.lerp_(returns.mean(dim=(0, 1)), share)
