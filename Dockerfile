@@ -1,4 +1,4 @@
-# The README's two commands, in a container.
+# The README's training and tests, in a container.
 #
 #     docker build -t borearl .
 #     docker run --rm -v "$PWD/runs:/borearl/runs" borearl             # train, evaluate, score

@@ -463,6 +463,8 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
     def call(self, name: str, *args, **kwargs) -> tuple:
         """A method of every environment, as with gymnasium's AsyncVectorEnv: here `action_masks` only."""
         check_name("method", name, ("action_masks",))
+        if args or kwargs:
+            raise ValueError(f"call: action_masks takes no arguments, got {[*args, *kwargs.items()]}")
         return tuple(self.action_masks())
 
     def get_state(self) -> dict:

@@ -75,8 +75,8 @@ year,
 Before the first year both indices are those of an action that changes nothing: the middle density, the nearest mix.
 
 `boreal_env.action_masks(observations)` reads whole observations, 43 or 105 columns; with `observation_groups`, ask the
-environment: `env.action_masks()` or `env.mask_function()`. `boreal_env.in_unit(observations, "density")` gives an entry
-in its unit again.
+environment: `env.unwrapped.action_masks()` or `env.unwrapped.mask_function()`. `boreal_env.in_unit(observations,
+"density")` gives an entry in its unit again.
 
 {table(("index", "name", "unit", "normalised", "limits", "group"), map(observation_row, enumerate(rows)))}
 
@@ -125,12 +125,12 @@ import gymnasium as gym
 import boreal_env
 
 
-def timber(year):
-    \"\"\"Revenue from what is cut, 1 for 1 kgC/m2.\"\"\"
+def cut(year):
+    \"\"\"Carbon of what is cut, 1 for 1 kgC/m2.\"\"\"
     return year["harvest_kgc_m2"]
 
 
-env = gym.make("boreal-generalist-v0", objectives=("carbon", "thaw", boreal_env.Objective("timber", timber, 0.0, 1.0)))
+env = gym.make("boreal-generalist-v0", objectives=("carbon", "thaw", boreal_env.Objective("cut", cut, 0.0, 1.0)))
 ```
 """
 

@@ -23,7 +23,7 @@ BEST_PLAN, DECIDUOUS = "best_constant_mix", "dense_deciduous"
 PLANTING = ("plus_100", "")
 LEARNED = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum", "ppo_group")
 """Rows of the README below the plans that look at nothing."""
-MORE_STEPS = 1_000_000
+MORE_STEPS = (1_000_000, 3_000_000)
 SPLITS = 1000  # of the test sites into random halves
 NOT_RUN = "Not run yet: `python analysis/reproduce.py --only main balanced`.\n"
 
@@ -67,22 +67,22 @@ def short_table(results) -> str:
         seeds = " and ".join(dict.fromkeys(str(len(replicates)) for replicates in of_worlds if replicates))
         cells = [shown(main_results.scores(one)) if len(one) > 1 else "" for one in of_worlds]
         text += f"| {methods.title(script)} | {seeds or 'not run yet'} | {' | '.join(cells)} |\n"
-    return text + of_more_steps(results)
+    return text + "".join(of_more_steps(results, steps) for steps in MORE_STEPS)
 
 
-def of_more_steps(results) -> str:
-    """The row of the best method with `MORE_STEPS`; none until both worlds have several seeds."""
-    of_worlds = [with_more_steps(results, env_id) for env_id in WORLDS]
+def of_more_steps(results, steps: int) -> str:
+    """The row of the best method with so many steps; none until both worlds have several seeds."""
+    of_worlds = [with_more_steps(results, env_id, steps) for env_id in WORLDS]
     if min(map(len, of_worlds)) < 2:
         return ""
     values = " | ".join(shown(main_results.scores(replicates)) for replicates in of_worlds)
     seeds = " and ".join(dict.fromkeys(str(len(replicates)) for replicates in of_worlds))
-    return f"| {methods.title(LEARNED[-1])}, {MORE_STEPS:,} steps | {seeds} | {values} |\n"
+    return f"| {methods.title(LEARNED[-1])}, {steps:,} steps | {seeds} | {values} |\n"
 
 
-def with_more_steps(results, env_id: str) -> list:
-    """The runs of the best method with `MORE_STEPS` in a world."""
-    setting = f"total_timesteps={MORE_STEPS}, vectorization=lockstep"
+def with_more_steps(results, env_id: str, steps: int) -> list:
+    """The runs of the best method with so many steps in a world."""
+    setting = f"total_timesteps={steps}, vectorization=lockstep"
     return results.rows_of_two_objectives().get((LEARNED[-1], env_id, setting), [])
 
 
@@ -218,17 +218,19 @@ def paragraph(results, env_id: str) -> str:
         + f"; {named(above(rows[PLANTING]))} above planting half and half; "
         f"{named(below)} below that."
     )
-    longer = with_more_steps(results, env_id)
-    if len(longer) > 1:
-        its = main_results.scores(longer)
+    longer = {steps: with_more_steps(results, env_id, steps) for steps in MORE_STEPS}
+    longer = {steps: replicates for steps, replicates in longer.items() if len(replicates) > 1}
+    for steps, replicates in longer.items():
+        its = main_results.scores(replicates)
         side = {1: "above 100", 0: "not told apart from 100", -1: "below 100"}[
-            beside_100(*ends_of_score(its, longer, best_plans))
+            beside_100(*ends_of_score(its, replicates, best_plans))
         ]
-        scores = f"{methods.title(LEARNED[-1])} scores {shown(its)}, {side}"
-        budget = f"With {MORE_STEPS:,} steps and {of_seeds(longer)}"
-        of_these_sites = points(longer, best_plans, best_plans)
-        ahead += f" {budget} {scores}. There every drawn set of sites has best plans of its own, which are its 100."
-        ahead += f" With those of all sites kept, it gains {of_these_sites} points more than they do."
+        ahead += f" With {steps:,} steps and {of_seeds(replicates)} {methods.title(LEARNED[-1])} scores {shown(its)}, "
+        ahead += f"{side}."
+    if longer:
+        more = listed([points(replicates, best_plans, best_plans) for replicates in longer.values()])
+        ahead += " These intervals are of sites like these, which have other best plans and so another 100. Over the "
+        ahead += f"best plans of these very sites it is {more} points."
     few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]
     if few:
         ahead += f" Few training seeds: {listed([f'{methods.title(*method)} {len(rows[method])}' for method in few])}."

@@ -60,7 +60,7 @@ TABLES = (
 SHOWN = 3  # commands of what is not there
 EXPLANATION = """Score: 0 is to do nothing, 100 the best constant plan of each weight. Interquartile mean over training
 seeds [95 % bootstrap interval, of score and gain over seeds and sites]. Seeds to tell 0.1: how many training seeds
-each of two methods needs whose gains differ by 0.1."""
+each of two methods needs for four tests of five (t, 5 %) to tell gains apart that differ by 0.1."""
 
 
 @dataclass
@@ -114,6 +114,10 @@ def main(args: Args) -> None:
     if others:
         of = f"{len(others)} of {len(results.runs)} runs were made with another source of the simulator, or do not say"
         print(f"{of} with which, such as {others[0].folder}; --overwrite makes a run anew", file=sys.stderr)
+    mixed = [run for run in results.runs if "begun_with" in run.config]
+    if mixed:
+        of = f"{len(mixed)} of {len(results.runs)} runs were begun with one code and went on with another"
+        print(f"{of}, such as {mixed[0].folder} (begun_with in config.json)", file=sys.stderr)
     if not results.runs:
         where, first = ", ".join(map(str, results.roots)), next(job.command for job in results.missing if job.exists)
         protocol.fail(f"no finished run under {where}; `{first}` makes the first, `python analysis/reproduce.py` all")
@@ -131,6 +135,9 @@ def main(args: Args) -> None:
         if module is main_results:
             print(f"{EXPLANATION}\n")
             print(text.loc[(table.seeds > 0).to_numpy(), list(main_results.TERMINAL)].to_string(index=False))
+            elsewhere = [run for run in results.runs if run.arguments["env_id"] not in main_results.ENVIRONMENTS]
+            if elsewhere:
+                print(f"\nRuns of other environments, {len(elsewhere)}, are in {folder / 'detailed_objectives.md'}.")
     others = many_objectives.make(results)
     for stem in many_objectives.STEMS:
         for path in set(folder.glob(f"{stem}_*.csv")) - {folder / f"{name}.csv" for name in others}:

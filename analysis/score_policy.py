@@ -203,6 +203,8 @@ def main(args: Args) -> None:
     try:
         policy = protocol.load_policy(args.policy, args.script)
         check_name(args.name or policy.script, args)
+        if args.add and policy.env_id not in TASKS:
+            raise ValueError(f"--add: a policy trained on {' or '.join(TASKS)} is allowed, not on {policy.env_id}")
         tasks = [task_of(policy, env_id) for env_id in args.tasks]  # refused before anything is played
         print(f"{policy.name}: {policy.script}, {check(policy, args.policy)}")
         row = {

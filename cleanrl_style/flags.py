@@ -209,7 +209,7 @@ def check_limits(args) -> None:
         return
     fill_in_envs(args)
     if args.num_envs % getattr(args, "group_size", 1):
-        fail(f"--group-size {args.group_size}: a divisor of --num-envs {args.num_envs} is allowed")
+        fail(f"--num-envs {args.num_envs}: a multiple of --group-size {args.group_size} is allowed")
     if getattr(args, "rollout_steps", 0) % args.num_envs:
         fail(
             f"--rollout-steps {args.rollout_steps}, a sum over all environments, must be a multiple of "

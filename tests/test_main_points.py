@@ -87,8 +87,8 @@ def test_more_steps_are_a_row_of_their_own(results):
         "\n| Group PPO, 1,000,000 steps | 5 | 110 [105, 115] | 110 [105, 115] |\n"
     )
     words = " ".join(main_points.in_words(results).split())
-    assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110 [105, 115], above 100. There every" in words
-    assert "With those of all sites kept, it gains 10.0 points more than they do." in words
+    assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110 [105, 115], above 100. These" in words
+    assert "Over the best plans of these very sites it is 10.0 points." in words
 
 
 def test_the_words_follow_from_the_numbers(results):

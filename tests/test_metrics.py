@@ -192,7 +192,7 @@ def test_bootstrap_interval():
 
 @pytest.mark.parametrize(("seeds", "covered"), [(3, 0.75), (5, 0.91)])
 def test_few_seeds_have_intervals_that_are_too_narrow(seeds, covered):
-    """As README.md and docs/results.md say of them."""
+    """As docs/results.md says of them."""
     samples = np.random.default_rng(1).normal(size=(400, seeds))
     ends = np.array([metrics.bootstrap_interval(values, repetitions=300) for values in samples])
     assert ((ends[:, 0] < 0) & (ends[:, 1] > 0)).mean() == pytest.approx(covered, abs=0.04)
@@ -245,6 +245,25 @@ def test_both_seeds_and_sites_widen_the_interval():
     assert width(between_seeds=0.0) == pytest.approx(4 * 0.35 / 10, rel=0.2)
     assert width(between_sites=0.0) == pytest.approx(4 * 0.1 * np.sqrt(1.2 / 10), rel=0.4)
     assert width() > max(width(between_seeds=0.0), width(between_sites=0.0))
+
+
+def test_the_best_plan_is_chosen_anew_on_every_drawn_set_of_sites():
+    # each of two plans gains 1 on a half of the sites: on a set that has more of one half, that half's is the best
+    half = np.repeat([1.0, 0.0], 50)
+    plans = np.stack([half, 1 - half])[:, None, :]
+    value, low, high = metrics.score_interval(np.full((4, 100), 0.5), plans)
+    assert value == pytest.approx(100) and high < 100 + 1e-9 and low == pytest.approx(100 / (1 + 2 * 0.112), abs=1)
+
+
+def test_a_difference_has_an_interval_of_four_standard_errors():
+    rng = np.random.default_rng(3)
+    first, second = (rng.normal(mean, 1, size=(1, 400)) for mean in (1.0, 0.0))
+    value, low, high = metrics.difference_interval(first, second)
+    assert value == pytest.approx((first - second).mean())
+    assert high - low == pytest.approx(4 * (first - second).std() / 20, rel=0.05)
+    first, second = (np.tile(rng.normal(size=(200, 1)), 3) for _ in range(2))  # of seeds alone
+    _, low, high = metrics.difference_interval(first, second)
+    assert high - low == pytest.approx(4 * np.sqrt(1.2 * 2 / 200), rel=0.15)
 
 
 def test_seeds_that_tell_a_difference():

@@ -13,7 +13,7 @@ from scripts import ROOT, run_script
 from toy_env import optimal_return
 
 import boreal_env
-from cleanrl_style import protocol
+from cleanrl_style import ppo_curriculum, ppo_group, protocol
 from cleanrl_style.ppo_curriculum import Agent, Args, Curriculum, compute_gae, weigh_advantages
 from cleanrl_style.protocol import run_folder
 
@@ -94,7 +94,8 @@ def test_masked_actions_give_no_gradient():
     assert not plant.any() and not gate.any() and other.any()
 
 
-def test_gae_of_a_hand_computed_episode():
+@pytest.mark.parametrize("compute_gae", [ppo_curriculum.compute_gae, ppo_group.compute_gae])
+def test_gae_of_a_hand_computed_episode(compute_gae):
     # gamma and lambda 0.5; an episode of three steps (rewards 1, 2, 4, values 1, 2, 3), then the next one
     rewards = torch.tensor([[1.0], [2.0], [4.0], [8.0]])
     values = torch.tensor([[1.0], [2.0], [3.0], [5.0]])

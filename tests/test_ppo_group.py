@@ -188,7 +188,7 @@ def test_killed_and_resumed_is_as_never_killed(arguments, tmp_path, monkeypatch)
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        (("--group-size", 3), "--group-size 3: a divisor of --num-envs 4 is allowed"),
+        (("--group-size", 3), "--num-envs 4: a multiple of --group-size 3 is allowed"),
         (("--group-size", 0), r"--group-size must lie in \[1, 1000\], not 0"),
         (("--gae-lambda", 1, 1, 1), r"--gae-lambda: 1 number or 2 are allowed, not \[1.0, 1.0, 1.0\]"),
         (("--gae-lambda", 1.5, 1), r"--gae-lambda must lie in \[0, 1\], not 1.5"),

@@ -250,7 +250,10 @@ def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, t
     os.killpg(first.pid, signal.SIGINT)
     code, out, err = finish(first)
     assert code == 130 and "resuming at step 600" in out
-    assert "was begun with numpy 1.0 there" in err and "source another there" in err and "Traceback" not in err
+    assert "was begun with other code" in err and "numpy 1.0 there" in err and "source another there" in err
+    assert "Traceback" not in err
+    config = json.loads((folder / "config.json").read_text())
+    assert config["begun_with"] == [{"numpy": "1.0", "source": "another"}] and config["source"] != "another"
 
 
 def test_of_two_processes_that_start_at_once_the_second_leaves_no_configuration(tmp_path):

@@ -11,11 +11,10 @@ from sim import radiation
 from sim.io import disaggregation
 from sim.jit import uncompiled
 from sim.physical_constants import FREEZING_POINT_K
-from sim.weather import saturation_pressure, saturation_slope, sky_emissivity
+from sim.weather import sky_emissivity
 
 black_body = uncompiled(radiation.black_body)
 emissivity = uncompiled(sky_emissivity)
-saturation_of, slope_of = uncompiled(saturation_pressure), uncompiled(saturation_slope)
 
 MEASURED_SHARE = 0.5
 SEASONS = {"winter": (12, 1, 2), "spring": (3, 4, 5), "summer": (6, 7, 8), "autumn": (9, 10, 11)}

@@ -50,7 +50,7 @@ class Policy:
         episode so far, which EUPG's policies look at. generator : draws the action instead.
         """
         if np.asarray(mask).dtype != bool and not np.isin(mask, (0, 1)).all():
-            raise ValueError(f"{self.name}: a mask has a value that is neither true nor false")
+            raise ValueError(f"{self.name}: masks of true and false are allowed, env.unwrapped.action_masks()")
         observations, masks = np.atleast_2d(np.asarray(observation, np.float32)), np.atleast_2d(np.asarray(mask, bool))
         if observations.shape[1] != self.size or masks.shape != (len(observations), 25):
             raise ValueError(

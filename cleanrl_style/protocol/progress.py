@@ -40,7 +40,8 @@ class Progress:
             line += f", {self.note}"
         elif self.returns:
             means = zip(self.objectives, np.mean(self.returns, axis=0), strict=True)
-            line += "".join(f", {name} {mean:+.2f}" for name, mean in means)
+            text = ", ".join(f"{name} {mean:+.2f}" for name, mean in means)
+            line += f", mean returns of the last {len(self.returns)} episodes: {text}"
         if self.terminal:
             width = shutil.get_terminal_size().columns - 1
             print("\r" + line[:width].ljust(width), end="\n" if last else "", flush=True)

@@ -217,8 +217,16 @@ class Run:
             print(f"{self.folder}: this run is finished (--overwrite starts over)")
             sys.exit(0)
         code_here = {**self.config["versions"], **{name: self.config[name] for name in CODE}}
+        self.config |= {"begun_with": config["begun_with"]} if "begun_with" in config else {}
         if code_there != code_here:
-            print(f"warning: {self.folder} was begun with {differences(code_there, code_here)}", file=sys.stderr)
+            changed = {name: value for name, value in code_there.items() if code_here.get(name) != value}
+            self.config["begun_with"] = [*self.config.get("begun_with", []), changed]
+            self._write_config()
+            print(
+                f"warning: {self.folder} was begun with other code, and goes on with this: "
+                f"{differences(code_there, code_here)}; its config.json says so, --overwrite starts over",
+                file=sys.stderr,
+            )
 
     def _made_by_all(self) -> tuple[str, ...]:
         """Files that every finished run in this environment has."""

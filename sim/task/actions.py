@@ -90,8 +90,9 @@ def action_masks(observations: np.ndarray, harvest_min_class: str = "young", obj
     """Valid actions of observations: those whose whole density change can be made, and so cost no penalty.
 
     observations : (n, 43) or (n, 105) for two objectives, all groups of a mode; a reduced observation does not say
-    which columns it has, but `env.action_masks()` and `env.mask_function()` know. harvest_min_class : "young",
-    "mature" or "old". objectives : how many the environment has. Returns bool, shape (n, 25).
+    which columns it has, but `env.unwrapped.action_masks()` and `env.unwrapped.mask_function()` know.
+    harvest_min_class : "young", "mature" or "old". objectives : how many the environment has. Returns bool, shape
+    (n, 25).
     """
     if isinstance(objectives, bool) or not isinstance(objectives, (int, np.integer)) or objectives < 1:
         raise ValueError(f"objectives: a positive integer is allowed, got {objectives!r}")
@@ -104,5 +105,5 @@ def action_masks(observations: np.ndarray, harvest_min_class: str = "young", obj
             return MaskFunction(known, harvest_min_class)(observations)
     raise ValueError(
         f"observations of shape {observations.shape}: (n, {len(without_site)}) or (n, {len(names)}), all groups of a "
-        "mode, are allowed; env.action_masks() works with any observation_groups"
+        "mode, are allowed; env.unwrapped.action_masks() works with any observation_groups"
     )

@@ -297,8 +297,8 @@ def in_unit(observations: np.ndarray, name: str, names: Sequence[str] = OBSERVAT
     least = sum(row.group != "site" for row in OBSERVATION) if names is OBSERVATION_NAMES else len(names)
     if np.ndim(observations) != 2 or np.shape(observations)[1] < least:
         raise ValueError(
-            f"observations: shape (n, {least}) or wider is allowed with these names, got {np.shape(observations)}; the "
-            "names of an environment's entries are its observation_names"
+            f"observations: shape (n, {least}) or wider is allowed with these names, got {np.shape(observations)}; "
+            "observation[None] makes one of one, and the names of an environment's entries are its observation_names"
         )
     reader, observations = Reader((name,), names), np.asarray(observations)
     width = observations.shape[1]
