@@ -259,8 +259,8 @@ def budgets(seeds) -> list[Job]:
         (5, {"total_timesteps": 100_000}),
         (10, {"total_timesteps": 1_000_000}),  # rows of the README, as those of the main table
         (10, {"total_timesteps": 1_000_000, "env_id": BALANCED}),
-        (3, {"total_timesteps": 3_000_000}),
-        (3, {"total_timesteps": 3_000_000, "env_id": BALANCED}),
+        (5, {"total_timesteps": 3_000_000}),
+        (5, {"total_timesteps": 3_000_000, "env_id": BALANCED}),
     )
     return [
         trained("budgets", "ppo_group", seed, **change)

@@ -26,7 +26,7 @@ COUNTS = {
     "variants": 35,
     "mechanisms": 2,
     "difficulty": 2,
-    "budgets": 31,
+    "budgets": 35,
 }
 
 
