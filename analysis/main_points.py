@@ -100,7 +100,7 @@ def ends_of_difference(replicates: list, other: list) -> tuple[float, float]:
     _, low, high = metrics.difference_interval(first, second)
     (ours, our_half), (theirs, their_half) = (metrics.mean_interval(rows.mean(axis=1)) for rows in (first, second))
     half = np.hypot(our_half, np.nan_to_num(their_half))
-    return min(low, ours - theirs - half), max(high, ours - theirs + half)
+    return metrics.both_ends(low, high, ours - theirs, half)
 
 
 def is_above(replicates: list, other: list) -> bool:
@@ -116,8 +116,8 @@ def is_below(replicates: list, other: list) -> bool:
 def ends_of_score(scores: dict, replicates: list, best_plans: list) -> tuple[float, float]:
     """Ends of both 95 % intervals of a greedy score: over seeds and sites, and by t over seeds."""
     whole = on_sites(best_plans).to_numpy().mean()
-    mean, half = 100 * np.array(metrics.mean_interval(on_sites(replicates).mean(axis=1))) / whole
-    return min(scores["score_greedy_low"], mean - half), max(scores["score_greedy_high"], mean + half)
+    by_t = 100 * np.array(metrics.mean_interval(on_sites(replicates).mean(axis=1))) / whole
+    return metrics.both_ends(scores["score_greedy_low"], scores["score_greedy_high"], *by_t)
 
 
 def beside_100(low: float, high: float) -> int:
@@ -180,57 +180,14 @@ def paragraph(results, env_id: str) -> str:
     if not trained or PLANTING not in known:
         return ""
     deciduous, best_plans = blind(results, env_id, DECIDUOUS), blind(results, env_id, BEST_PLAN)
-    best = max(trained, key=known.__getitem__)
-    alike = [
-        method
-        for method in trained
-        if method != best and len(rows[method]) > 1 and not is_above(rows[best], rows[method])
-    ]
-
-    def above(other):
-        return [method for method in trained if is_above(rows[method], other)]
-
-    below = [method for method in trained if is_below(rows[method], rows[PLANTING])]
-    beside = {
-        method: beside_100(*ends_of_score(scores[method], rows[method], best_plans))
-        for method in trained
-        if len(rows[method]) > 1
-    }
-    over, even, under = ([method for method, side in beside.items() if side == which] for which in (1, 0, -1))
-    below_it = "all are below it" if len(under) == len(trained) else f"{len(under)} below it"
     plans = (
         f"Plans that look at nothing: 100 stems a year, half of them conifers, score {known[PLANTING]:.0f}, 100 "
         f"deciduous trees a year {shown(main_results.scores(deciduous))}. All constant plans together have a gain "
         f"hypervolume of {front_of_plans(results, env_id):.2f}. The best of each weight, which 100 stands for, gain "
         f"{flattery(results, env_id):.1f} % less when they are chosen on a half of the sites and judged on the other."
     )
-    ahead = (
-        f"Of {len(trained)} trained method{'s' if len(trained) > 1 else ''} {methods.title(*best)} scores highest, "
-        f"{shown(scores[best])} with {of_seeds(rows[best])} and a gain hypervolume of "
-        f"{gain_hypervolume(rows[best]):.2f}"
-    )
-    ahead += f", not told apart from {listed(titles_of(alike))}." if alike else "."
-    ahead += (
-        f" Its score less that of 100 deciduous trees a year is {points(rows[best], deciduous, best_plans)}. "
-        f"By both intervals, that of seeds and sites and that of seeds alone by t, {named(over)} above 100"
-        + (f", {named(even)} not told apart from it" if even else "")
-        + (f", {below_it}" if under else "")
-        + f"; {named(above(rows[PLANTING]))} above planting half and half; "
-        f"{named(below)} below that."
-    )
-    longer = {steps: with_more_steps(results, env_id, steps) for steps in MORE_STEPS}
-    longer = {steps: replicates for steps, replicates in longer.items() if len(replicates) > 1}
-    for steps, replicates in longer.items():
-        its = main_results.scores(replicates)
-        side = {1: "above 100", 0: "not told apart from 100", -1: "below 100"}[
-            beside_100(*ends_of_score(its, replicates, best_plans))
-        ]
-        ahead += f" With {steps:,} steps and {of_seeds(replicates)} {methods.title(LEARNED[-1])} scores {shown(its)}, "
-        ahead += f"{side}."
-    if longer:
-        more = listed([points(replicates, best_plans, best_plans) for replicates in longer.values()])
-        ahead += " These intervals are of sites like these, which have other best plans and so another 100. Over the "
-        ahead += f"best plans of these very sites it is {more} points."
+    ahead = ranking({method: rows[method] for method in trained}, scores, rows[PLANTING], deciduous, best_plans)
+    ahead += of_longer_trainings(results, env_id, best_plans)
     few = [method for method in trained if len(rows[method]) < FEWEST_SEEDS]
     if few:
         ahead += f" Few training seeds: {listed([f'{methods.title(*method)} {len(rows[method])}' for method in few])}."
@@ -242,6 +199,57 @@ def paragraph(results, env_id: str) -> str:
     )
 
 
+def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plans: list) -> str:
+    """Which trained method scores highest, and which are told from it, from 100 and from planting half and half."""
+    best = max(rows, key=lambda method: scores[method]["score_greedy"])
+    alike = [
+        method for method in rows if method != best and len(rows[method]) > 1 and not is_above(rows[best], rows[method])
+    ]
+
+    above = [method for method in rows if is_above(rows[method], planting)]
+    below = [method for method in rows if is_below(rows[method], planting)]
+    beside = {
+        method: beside_100(*ends_of_score(scores[method], rows[method], best_plans))
+        for method in rows
+        if len(rows[method]) > 1
+    }
+    over, even, under = ([method for method, side in beside.items() if side == which] for which in (1, 0, -1))
+    below_it = "all are below it" if len(under) == len(rows) else f"{len(under)} below it"
+    text = (
+        f"Of {len(rows)} trained method{'s' if len(rows) > 1 else ''} {methods.title(*best)} scores highest, "
+        f"{shown(scores[best])} with {of_seeds(rows[best])} and a gain hypervolume of "
+        f"{gain_hypervolume(rows[best]):.2f}"
+    )
+    text += f", not told apart from {listed(titles_of(alike))}." if alike else "."
+    return text + (
+        f" Its score less that of 100 deciduous trees a year is {points(rows[best], deciduous, best_plans)}. "
+        f"By both intervals, that of seeds and sites and that of seeds alone by t, {named(over)} above 100"
+        + (f", {named(even)} not told apart from it" if even else "")
+        + (f", {below_it}" if under else "")
+        + f"; {named(above)} above planting half and half; "
+        f"{named(below)} below that."
+    )
+
+
+def of_longer_trainings(results, env_id: str, best_plans: list) -> str:
+    """What the best method scores with `MORE_STEPS`, and whether that is told from 100; empty without such runs."""
+    longer = {steps: with_more_steps(results, env_id, steps) for steps in MORE_STEPS}
+    longer = {steps: replicates for steps, replicates in longer.items() if len(replicates) > 1}
+    text = ""
+    for steps, replicates in longer.items():
+        its = main_results.scores(replicates)
+        side = {1: "above 100", 0: "not told apart from 100", -1: "below 100"}[
+            beside_100(*ends_of_score(its, replicates, best_plans))
+        ]
+        text += f" With {steps:,} steps and {of_seeds(replicates)} {methods.title(LEARNED[-1])} scores {shown(its)}, "
+        text += f"{side}."
+    if longer:
+        more = listed([points(replicates, best_plans, best_plans) for replicates in longer.values()])
+        text += " These intervals are of sites like these, which have other best plans and so another 100. Over the "
+        text += f"best plans of these very sites it is {more} points."
+    return text
+
+
 def responses(replicates: list) -> np.ndarray:
     """Change of the greedy policy's returns from the lowest to the highest weight, (returns, seeds, sites)."""
     return np.stack([metrics.response_of_sites(one.by_policy["greedy"]) for one in replicates], axis=1)
@@ -250,8 +258,7 @@ def responses(replicates: list) -> np.ndarray:
 def ends(changes: np.ndarray) -> tuple[float, float]:
     """Ends of both 95 % intervals of a change (seeds, sites): over seeds and sites, and by t over seeds."""
     _, low, high = metrics.score_interval(changes, None)
-    mean, half_width = metrics.mean_interval(changes.mean(axis=1))
-    return min(low, mean - half_width), max(high, mean + half_width)
+    return metrics.both_ends(low, high, *metrics.mean_interval(changes.mean(axis=1)))
 
 
 def following(rows: dict[tuple[str, str], list]) -> str:

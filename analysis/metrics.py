@@ -62,6 +62,11 @@ def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values.mean(axis=0), scipy.stats.t.ppf(0.975, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
 
 
+def both_ends(low: float, high: float, mean: float, half_width: float) -> tuple[float, float]:
+    """Ends of two 95 % intervals together, a bootstrap's and t's: what is told is told by both."""
+    return min(low, mean - half_width), max(high, mean + half_width)
+
+
 def with_interval(name: str, values: np.ndarray) -> dict[str, float]:
     """A mean under its name, and the ends of its 95 % t interval under <name>_low and <name>_high."""
     mean, half_width = mean_interval(values)

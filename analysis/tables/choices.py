@@ -37,8 +37,8 @@ def by_seed(replicates: list) -> dict[int, object]:
 
 def is_told(changes: np.ndarray, low: float, high: float) -> bool:
     """Whether neither an interval nor, of the differences (seeds, sites), the t interval over seeds has 0 in it."""
-    mean, half_width = metrics.mean_interval(np.asarray(changes).mean(axis=1))
-    return bool(min(low, mean - half_width) > 0.0 or max(high, mean + half_width) < 0.0)
+    low, high = metrics.both_ends(low, high, *metrics.mean_interval(np.asarray(changes).mean(axis=1)))
+    return bool(low > 0.0 or high < 0.0)
 
 
 def difference(name: str, changes: np.ndarray, plans: np.ndarray | None) -> dict:
