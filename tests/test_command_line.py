@@ -203,6 +203,17 @@ def test_a_finished_run_that_is_damaged_is_not_called_finished(run, tmp_path, na
     assert run_folder.damage_of(folder, 5) == name
 
 
+def test_a_finished_run_that_lost_an_episode_of_one_weight_is_damaged(run, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(run, folder)
+    one = pd.read_csv(folder / "evaluation.csv")
+    two = pd.concat([one, one.assign(episode=1)])
+    two.to_csv(folder / "evaluation.csv", index=False)
+    assert run_folder.damage_of(folder, 5) is None
+    two.iloc[:-1].to_csv(folder / "evaluation.csv", index=False)
+    assert run_folder.damage_of(folder, 5) == "evaluation.csv"
+
+
 def test_what_saves_no_policy_is_finished_without_one(run, tmp_path):
     shutil.copytree(run, tmp_path / "run", ignore=shutil.ignore_patterns("policy.pt"))
     config = json.loads((run / "config.json").read_text())

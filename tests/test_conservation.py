@@ -13,7 +13,7 @@ import pytest
 import sim
 from sim.closure import TOLERANCES
 from sim.demography import AGES
-from sim.physical_constants import LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
+from sim.physical_constants import ICE_HEAT_CAPACITY, LATENT_HEAT_FUSION, LATENT_HEAT_VAPORISATION
 from sim.spin_up import INITIAL_LIMITS
 from sim.state import CARBON_BUDGETS, DAILY_NAMES, STATE_NAMES
 from sim.task.episodes import BALANCED_WORLD
@@ -229,6 +229,27 @@ def test_heat_of_the_deep_soil(run):
         assert r.boundary_warming_mj_m2.min() >= 0.0 and r.boundary_cooling_mj_m2.min() >= 0.0
 
 
+def test_heat_of_the_year(run):
+    """What net radiation brings warms the air, evaporates water, melts snow, is stored as carbon, or stays."""
+    skin, per_gram = (sim.CONSTANTS[name].low for name in ("skin_heat_capacity", "photosynthesis_energy"))
+
+    def heat(state):
+        trunks = store(state, ["trunk_capacity"]) * store(state, ["trunk"])
+        ground = (skin + ICE_HEAT_CAPACITY * store(state, ["swe"])) * store(state, ["ground"])
+        return trunks + ground + store(state, ["organic_heat", "surface_heat", "deep_heat"])
+
+    for year in run:
+        r = year.record
+        snow = store(year.after, WATER_STORES[:2]) - store(year.before, WATER_STORES[:2])
+        melted = r.snowfall_mm - r.sublimation_mm - snow
+        down = r.boundary_warming_mj_m2 - r.boundary_cooling_mj_m2
+        moved = r.advected_heat_mj_m2 + r.growth_heat_mj_m2
+        gained = r.net_radiation_mj_m2 - r.sensible_heat_mj_m2 - r.latent_heat_mj_m2 - down + moved
+        used = 1e-6 * (LATENT_HEAT_FUSION * melted + 1000.0 * per_gram * r.gpp_kgc_m2)
+        change = 1e-6 * (heat(year.after) - heat(year.before))
+        np.testing.assert_allclose(change, gained - used, rtol=0, atol=3.2e-5)  # 1e-6 W m-2 all the year
+
+
 @pytest.mark.parametrize(
     "name",
     [
@@ -364,11 +385,34 @@ def test_fire_moves_carbon_between_named_fluxes_only():
     np.testing.assert_allclose(table.net_carbon_change_kgc_m2, crossed, atol=1e-10)
 
 
+def test_no_more_soil_burns_than_is_there():
+    """A thick layer of moss on poor soil: the fire takes half of the layer's depth, and half of the soil's carbon."""
+    site = {"fire_base_probability": 0.05, "fire_drought_threshold": 0.0, "summer_rain_prob": 0.0}
+    certain = {f"flammability_{cover}": 20.0 for cover in ("conifer", "deciduous", "open")}
+    half = {"fire_organic_low": 0.5, "fire_organic_high": 0.51}
+    initial = {"organic_layer_m": 2.0, "soil_kgc_m2": 2.0}
+    table = sim.simulate(
+        site, 12, seed=3, years=1, time_step_minutes=120, initial=initial, constants={**certain, **half}
+    )
+    assert table.fire_mortality.iloc[0] > 0.0
+    assert table.burned_soil_kgc_m2.iloc[0] == pytest.approx(0.5 * 2.0, rel=0.05)
+    assert table.soil_kgc_m2.iloc[0] > 0.0
+
+
 def test_insects_kill_the_share_they_are_given():
     site = {"insect_base_probability": 1.0, "insect_mortality_rate": 0.4, "mean_annual_temperature_c": 5.0}
     initial = {"density_stems_ha": 1500.0, "conifer_fraction": 1.0}
     table = sim.simulate(site, 12, seed=1, years=1, time_step_minutes=120, initial=initial)
     assert table.insect_mortality.iloc[0] == pytest.approx(0.4)
+
+
+def test_insects_kill_fewer_deciduous_trees():
+    """A quarter as many as of the conifers: of a stand that is half and half, 0.4 and 0.1 of the halves."""
+    site = {"insect_base_probability": 1.0, "insect_mortality_rate": 0.4, "mean_annual_temperature_c": 5.0}
+    initial = {"density_stems_ha": 1500.0, "conifer_fraction": 0.5}
+    quiet = {"constants": {"insect_deciduous": 0.25}, "mechanisms": {"fire": False}}
+    table = sim.simulate(site, 12, seed=1, years=1, time_step_minutes=120, initial=initial, **quiet)
+    assert table.insect_mortality.iloc[0] == pytest.approx(0.25)
 
 
 def test_snow_that_sublimates_away_within_a_step_does_not_heat_the_ground():

@@ -222,6 +222,17 @@ def test_other_thaw_formulations_are_also_judged_by_the_asymmetric_one():
     assert not np.allclose(other.thaw_return, own.thaw_return)
 
 
+def test_the_asymmetric_return_of_a_record_by_hand():
+    """Years of -2.5 x 8 / 40, of 20 / 40, and two beyond what a year can earn or lose."""
+    record = {
+        "boundary_cooling_mj_m2": np.array([0.0, 20.0, 0.0, 500.0]),
+        "boundary_warming_mj_m2": np.array([8.0, 0.0, 400.0, 0.0]),
+    }
+    assert evaluation.asymmetric_thaw_return(record) == pytest.approx(-0.5 + 0.5 - 1.0 + 1.0)
+    without_the_last = {name: values[:3] for name, values in record.items()}
+    assert evaluation.asymmetric_thaw_return(without_the_last) == pytest.approx(-1.0)
+
+
 # --------------------------------------------------------------------------------------------- run folder
 
 

@@ -238,6 +238,16 @@ def test_a_table_shorter_than_its_checkpoint_is_refused(interrupted, tmp_path):
         resume(folder)
 
 
+def test_a_table_changed_since_its_checkpoint_is_refused(interrupted, tmp_path):
+    folder = copy(interrupted, tmp_path)
+    size = torch.load(folder / "checkpoint.pt", weights_only=False)["table_sizes"]["episodes"]
+    rows = bytearray((folder / "episodes.csv").read_bytes())
+    rows[size - 1] = ord("0")  # where a row ended
+    (folder / "episodes.csv").write_bytes(rows)
+    with pytest.raises(SystemExit, match="episodes.csv is not as it was when the checkpoint was written"):
+        resume(folder)
+
+
 def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, tmp_path):
     folder = copy(interrupted, tmp_path)
     config = json.loads((folder / "config.json").read_text())

@@ -81,6 +81,21 @@ def test_annual_and_daily_output_are_of_the_same_run():
     assert ((by_year.air_temperature_c.agg(lambda t: (t > 5.0).sum())) == annual.growing_season_days).all()
 
 
+def test_snow_is_off_on_the_day_after_its_last():
+    """Frost and snow until 30 April, then warmth without rain, and snow again in December."""
+    forcing = observed()
+    day = forcing.index.day_of_year
+    cold = (day <= 120) | (day > 334)
+    forcing["air_temperature_c"] = np.where(cold, -8.0, 12.0)
+    forcing["precipitation_mm"] = np.where(cold, 0.1, 0.0)
+    annual, daily = simulate(forcing=forcing), simulate(forcing=forcing, output="daily")
+    snowy = daily.doy[daily.swe_mm > 1.0]
+    assert snowy.iloc[-1] == 365 and len(snowy) == annual.snow_days[0]
+    last = snowy[snowy < 300].iloc[-1]
+    assert 121 <= last < 150
+    assert annual.snow_off_doy[0] == last + 1
+
+
 def test_one_action_for_all_years_or_one_for_each():
     pd.testing.assert_frame_equal(simulate(actions=24, years=3), simulate(actions=[24, 24, 24], years=3))
     planted = simulate(actions=[24, 12, 17], years=3).planted_stems_ha
@@ -192,6 +207,12 @@ def test_a_site_without_stems_keeps_no_living_carbon():
     assert table.density_stems_ha[0] > 0.0  # recruits
 
 
+def test_seedlings_on_empty_ground_are_of_both_species():
+    table = simulate(initial={"density_stems_ha": 0.0})
+    assert table.recruited_stems_ha[0] == table.density_stems_ha[0] > 0.0
+    assert table.conifer_fraction[0] == 0.5
+
+
 @pytest.mark.parametrize("minutes", [10, 15, 30, 60, 120])
 def test_any_divisor_of_a_day_is_a_time_step(minutes):
     table = simulate(time_step_minutes=minutes)
@@ -248,6 +269,31 @@ def test_balanced_soil_carbon_keeps_what_it_gets():
     assert given.soil_kgc_m2[0] - given.soil_change_kgc_m2[0] == pytest.approx(3.0)
     treeless = {"density_stems_ha": 0.0}
     pd.testing.assert_frame_equal(simulate(initial=treeless, soil_carbon="balanced"), simulate(initial=treeless))
+
+
+def test_soil_in_balance_respires_what_it_gets():
+    """Soil that gets 0.8 a year and respires a tenth of what it has at each moment is in balance at 8."""
+    after = 8.0 - 4.0 * np.exp(-0.1)  # a year after it had 4
+    balanced = spin_up.soil_carbon_in_balance(4.0, after - 4.0, 0.8 - (after - 4.0))
+    assert balanced == pytest.approx(8.0, rel=2e-3)
+
+
+def test_the_search_for_the_deep_soils_heat_leaps_no_further_than_15_years():
+    no_limits = np.array([[-1e9, 1e9]])
+
+    def leap(gain, gain_before, moved, limits=no_limits):
+        """From an enthalpy of 100, to which the last leap moved it."""
+        return spin_up.next_deep_heat(
+            np.array([100.0]), np.array([gain]), np.array([100.0 - moved]), np.array([gain_before]), limits
+        )[0]
+
+    assert leap(2.0, 4.0, 3.0) == pytest.approx(103.0)  # as much again, and nothing is gained
+    assert leap(-2.0, -4.0, -3.0) == pytest.approx(97.0)
+    assert leap(2.0, 2.1, 3.0) == pytest.approx(130.0)  # the straight line leads to 160
+    assert leap(-2.0, -2.1, -3.0) == pytest.approx(70.0)
+    assert leap(2.0, 1.0, 3.0) == pytest.approx(130.0)  # no line leads to balance
+    assert leap(2.0, 2.1, 3.0, np.array([[90.0, 110.0]])) == 110.0
+    assert spin_up.next_deep_heat(np.array([100.0]), np.array([2.0]), None, None, no_limits) == [102.0]
 
 
 def test_first_biomass_is_within_what_the_stems_hold():

@@ -45,6 +45,19 @@ def test_a_cone_is_sorted_by_its_diameter():
     assert thin[:2] == (0.0, 0.0) and thin[2] > 0.0
 
 
+def test_logs_of_a_thinning_by_hand():
+    """Stems of 20 cm, all of the oldest age: 50 of each species are cut, and sawn to tops of 15 and 18 cm."""
+    stem = (20.0 / 3.83) ** 2.5
+    initial = {"conifer_old_stems_ha": 500.0, "deciduous_old_stems_ha": 500.0, "biomass_kgc_m2": 1000.0 * stem / 1e4}
+    year = sim.simulate(None, 2, years=1, time_step_minutes=120, initial=initial).iloc[0]
+    assert year.thinned_stems_ha == 100.0
+    for species, share, top in (("conifer", 0.80, 15.0), ("deciduous", 0.87, 18.0)):
+        logs = [year[f"{species}_{product}_kgc_m2"] for product in ("sawlog", "pulpwood", "energy_wood")]
+        sawn, kept = 1.0 - (top / 20.0) ** 3, 1.0 - (7.0 / 20.0) ** 3
+        whole = 50.0 * share * stem / 1e4
+        np.testing.assert_allclose(logs, np.multiply(whole, (sawn, kept - sawn, 1.0 - kept)), rtol=1e-9)
+
+
 @pytest.fixture(scope="module")
 def episode():
     """Thinned, thinned, planted, planted."""
