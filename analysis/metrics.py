@@ -151,7 +151,7 @@ def preference_response(evaluation: pd.DataFrame) -> pd.DataFrame:
 
 
 def response_of_sites(evaluation: pd.DataFrame) -> np.ndarray:
-    """Change of both returns from the lowest carbon weight to the highest on each site, (2, sites), by ascending seed."""
+    """Change of both returns from the lowest carbon weight to the highest, (2, sites), by ascending seed."""
     weights, returns = paired_returns(evaluation)
     if weights.shape[1] != 2:
         raise ValueError(f"a change from one weight to another is of two objectives, not of {weights.shape[1]}")
