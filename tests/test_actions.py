@@ -127,7 +127,7 @@ NO_WIDTHS = (10, WITHOUT_SITE - 1, WITHOUT_SITE + 1, ENTRIES - 1, ENTRIES + 1)
 @pytest.mark.parametrize("shape", [*((2, width) for width in NO_WIDTHS), (2, 2, ENTRIES), (0,)], ids=str)
 def test_masks_of_arrays_that_are_no_whole_observations_are_refused(shape):
     allowed = rf"\(n, {WITHOUT_SITE}\) or \(n, {ENTRIES}\)"
-    message = rf"observations of shape .*: {allowed}, all groups .*; env.action_masks\(\) works"
+    message = rf"observations of shape .*: {allowed}, all groups .*; env.unwrapped.action_masks\(\) works"
     with pytest.raises(ValueError, match=message):
         boreal_env.action_masks(np.zeros(shape))
 
