@@ -248,15 +248,18 @@ def test_a_table_changed_since_its_checkpoint_is_refused(interrupted, tmp_path):
         resume(folder)
 
 
-def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, tmp_path):
+def test_other_versions_are_named_and_a_second_process_is_refused(interrupted, tmp_path, monkeypatch):
     folder = copy(interrupted, tmp_path)
     config = json.loads((folder / "config.json").read_text())
     config["versions"]["numpy"], config["source"] = "1.0", "another"
     (folder / "config.json").write_text(json.dumps(config))
     first = start("ppo_gated", folder, *arguments("ppo_gated", TOY), TOY_SECONDS="0.01")
     wait_for_rows(first, folder, 5)
+    written = (folder / "config.json").read_bytes()
+    monkeypatch.setattr("cleanrl_style.protocol.run_folder.versions", lambda: {"numpy": "2.0"})
     with pytest.raises(SystemExit, match="another process is at work on this run"):
         resume(folder)
+    assert (folder / "config.json").read_bytes() == written
     os.killpg(first.pid, signal.SIGINT)
     code, out, err = finish(first)
     assert code == 130 and "resuming at step 600" in out

@@ -177,7 +177,7 @@ class Run:
             for name in (*RESULTS, *tracking.FOLDERS):
                 remove(self.folder / name)
             self.lock.truncate()
-        if not occupied or self.args.overwrite:
+        if not occupied or self.args.overwrite or "begun_with" in self.config:
             self._write_config()
         # timing.csv keeps its rows; the time that this run took goes on from the last whole one
         *rows, half_a_row = self.lock.read().split(b"\n")
@@ -217,11 +217,11 @@ class Run:
             print(f"{self.folder}: this run is finished (--overwrite starts over)")
             sys.exit(0)
         code_here = {**self.config["versions"], **{name: self.config[name] for name in CODE}}
-        self.config |= {"begun_with": config["begun_with"]} if "begun_with" in config else {}
+        if "begun_with" in config:
+            self.config["begun_with"] = config["begun_with"]
         if code_there != code_here:
             changed = {name: value for name, value in code_there.items() if code_here.get(name) != value}
-            self.config["begun_with"] = [*self.config.get("begun_with", []), changed]
-            self._write_config()
+            self.config["begun_with"] = [*self.config.get("begun_with", []), changed]  # written once the lock is ours
             print(
                 f"warning: {self.folder} was begun with other code, and goes on with this: "
                 f"{differences(code_there, code_here)}; its config.json says so, --overwrite starts over",

@@ -85,7 +85,7 @@ def score(gained: pd.DataFrame, best: pd.DataFrame) -> float:
     """
     ours, theirs = (np.unique(weights_of(table), axis=0) for table in (gained, best))
     if not np.array_equal(ours, theirs):
-        raise ValueError(f"score: of the same weights, got {ours.tolist()} of a policy, {theirs.tolist()} of plans")
+        raise ValueError(f"score: the same weights are allowed, policy {ours.tolist()}, plans {theirs.tolist()}")
     whole = best.scalarized_return.mean()
     return 100 * gained.scalarized_return.mean() / whole if whole > 0 else np.nan
 
