@@ -30,6 +30,6 @@ class Args:
     """start over in a folder that already holds a run"""
 
     num_envs: ClassVar[int] = 1  # morl-baselines steps one
-    trial: ClassVar = (2000, "half an hour to five hours")  # what `--help` says
+    trial: ClassVar = (2000, "half an hour to eight hours")  # what `--help` says
     left: ClassVar = """A stopped run starts over.
 The folder gets config.json, episodes.csv, cost.csv, evaluation.csv and summary.png, which docs/outside.md explains"""
