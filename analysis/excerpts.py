@@ -147,7 +147,7 @@ def outside_speed() -> str:
         return "Not run yet: `python analysis/studies/outside_speed.py`.\n"
     table = stored.read(path).pivot(index="script", columns="arithmetic")
     rows = [
-        [f"`{script}.py`", *(f"{row[column]:.1f}" for column in OUTSIDE_SPEED)]
+        [f"`{script}.py`", *("" if np.isnan(row[column]) else f"{row[column]:.1f}" for column in OUTSIDE_SPEED)]
         for script, row in table.loc[list(methods.OUTSIDE)].iterrows()
     ]
     return markdown(["command", *OUTSIDE_SPEED.values()], rows)
