@@ -174,8 +174,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     mixes (0, 0.25, 0.5, 0.75, 1). Planting adds seedlings of that mix; thinning cuts the oldest class first, so that
     the remaining stand nears the mix. Without a change of density the mix has nothing to act on: 10 to 14 are alike,
     and 12 stands for doing nothing. `action_masks()` says which actions can be carried out in full; the others are
-    legal, do what can be done, and cost a penalty: planting reaches 2000 stems/ha, thinning leaves 150 and cuts trees
-    from `harvest_min_class` on. The density penalty is another: a stand at or above
+    legal, do what can be done, and cost a penalty. Planting ends at 2000 stems/ha, thinning at 150, and it cuts only
+    trees of `harvest_min_class` and older. The density penalty is another: a stand at or above
     `density_limit` after the action costs it whatever the action, valid or not.
 
     ## Reward Space
@@ -191,12 +191,13 @@ class BorealEnv(Described, gym.Env, EzPickle):
 
     ## Starting State
     Site, first stocks and ages, weather and preference are drawn anew in generalist mode, and are fixed in
-    site-specific mode (but the preference). Soil, snow and water are spun up; dead wood is what deaths keep up.
+    site-specific mode (but the preference). Soil, snow and water are spun up, run for years before the first; dead
+    wood is what deaths keep up.
 
     ## Which Id
     `boreal-balanced-v0` is the task to study policies with: the ground below is in balance with the climate and the
     first stand above it, the soil's carbon with its litter, weather varies from day to day as on record, and both
-    returns vary equally between the policies that, on a site, none beats in both. `boreal-generalist-v0` and
+    returns vary equally between a site's non-dominated policies. `boreal-generalist-v0` and
     `boreal-site-specific-v0` are the paper's: use them to compare with it. There the boundary's temperature is drawn
     without regard to the climate, and so which site was drawn decides nearly all of the thaw return (in the balanced
     task, most of it). `boreal-timber-v0` is the balanced task with a third objective, timber at Finnish prices,

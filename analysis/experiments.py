@@ -248,7 +248,6 @@ def variants(seeds) -> list[Job]:
         ("ppo_gated", {"reward_scales": REWARD_SCALES}),
         ("eupg_var_lambda", {"utility": "total", "num_envs": 8}),
         ("eupg_var_lambda", OTHERS),
-        ("eupg_var_lambda", {"ent_coef": 0.05}),
     )
     return [trained("variants", script, seed, **change) for script, change in changes for seed in seeds_of(5, seeds)]
 

@@ -44,12 +44,6 @@ def steps(lines: list[str]) -> list[str]:
     return [command for command in single if command.startswith(("pip ", "python ", "pytest"))]
 
 
-def name(command: str) -> str:
-    """What the README calls a command: a script without its flags, anything else as it is."""
-    words = command.split()
-    return " ".join(word for word in words[:2] if not word.startswith("-")) if words[0] == "python" else command
-
-
 def prepare(folder: Path) -> dict[str, str]:
     """A clone and a virtual environment, which all commands then run in; what has to be in their environment."""
     subprocess.run(["git", "clone", "--quiet", ROOT, folder], check=True)
@@ -67,7 +61,7 @@ def follow(wanted: list[str], folder: Path, environment: dict[str, str]) -> tupl
         done = subprocess.run(command, shell=True, cwd=folder, env=environment, text=True, capture_output=True)
         if done.returncode:
             protocol.fail(f"{command}: exit {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
-        rows.append((name(command), round(time.perf_counter() - start)))
+        rows.append((command, round(time.perf_counter() - start)))
         printed[command] = done.stdout
     facts = machine()
     return pd.DataFrame(rows, columns=["command", "seconds"]).assign(

@@ -36,7 +36,6 @@ import tyro
 
 import boreal_env
 from analysis import metrics, paths, runs, stored
-from analysis.studies import open_loop
 from cleanrl_style import protocol
 from cleanrl_style.protocol import reference, sites
 from cleanrl_style.protocol.arguments import ask
@@ -221,7 +220,7 @@ def searched_plans(task: protocol.Task) -> pd.DataFrame | None:
     path = paths.studies() / "best_plans" / f"{task.env_id}.csv"
     if set(task.env_kwargs) - {"observation_groups"}:
         return None
-    if not path.exists() or stored.settings(path)["physics"] != open_loop.fingerprint():
+    if not path.exists() or stored.settings(path)["physics"] != reference.physics_name():
         print(f"{path} is not there, or of another physics: `python analysis/best_plans.py` makes it")
         return None
     table = stored.read(path, text=("plan",))

@@ -215,6 +215,7 @@ def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plan
     }
     over, even, under = ([method for method, side in beside.items() if side == which] for which in (1, 0, -1))
     below_it = "all are below it" if len(under) == len(rows) else f"{len(under)} below it"
+    below_it += f", {methods.title(*best)} too" if best in under and len(under) < len(rows) else ""
     text = (
         f"Of {len(rows)} trained method{'s' if len(rows) > 1 else ''} {methods.title(*best)} scores highest, "
         f"{shown(scores[best])} with {of_seeds(rows[best])} and a gain hypervolume of "
@@ -246,7 +247,7 @@ def of_longer_trainings(results, env_id: str, best_plans: list) -> str:
     if longer:
         more = listed([points(replicates, best_plans, best_plans) for replicates in longer.values()])
         text += " These intervals are of sites like these, which have other best plans and so another 100. Over the "
-        text += f"best plans of these very sites it is {more} points."
+        text += f"best plans of these very sites it gains {more} points more."
     return text
 
 
@@ -277,7 +278,7 @@ def following(rows: dict[tuple[str, str], list]) -> str:
     )
     text += f", and {named(less_cold, 'keep')} less." if less_cold else "."
     text += f" {named(unmoved, 'do')} the same whatever is asked for." if unmoved else ""
-    told = "said is what two intervals tell from 0, that over seeds and sites and that over seeds alone"
+    told = "a change is named if neither interval, that over seeds and sites or that over seeds alone, holds 0"
     return f"{text} (Greedy policies; {told}.)"
 
 

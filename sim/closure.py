@@ -4,8 +4,8 @@ import numpy as np
 
 from sim.state import PARAMETER_NAMES, RECORD_NAMES, STATE_NAMES
 
-#: Largest failure to close that a year may show: record column -> tolerance (its unit). Carbon and stems scale
-#: with the stock, whose round-off they contain.
+#: Largest failure to close that a year may show: record column -> tolerance (its unit). That of stems
+#: scales with the stock, whose round-off it contains.
 TOLERANCES = {
     "energy_residual_w_m2": 1e-6,
     "canopy_residual_w_m2": 1e-6,

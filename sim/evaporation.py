@@ -93,7 +93,7 @@ def evaporation(b, seconds):
         wet_share = s.canopy_rain[i] * w.per_rain_capacity[i]
         dry = (1.0 - wet_share) * equilibrium * w.leaf_coefficient[i]
         wet = wet_share * equilibrium * p.priestley_taylor_wet[i]
-        # Above 35 degC Priestley and Taylor's 1.26 would evaporate more than the net radiation.
+        # Above 30 degC Priestley and Taylor's 1.26 would evaporate more than the net radiation.
         scale = 1.0 / max(dry + wet, 1.0)
         w.dry_coefficient[i] = dry * scale
         w.wet_coefficient[i] = wet * scale

@@ -459,7 +459,7 @@ def write_fronts_and_variance(folder, generator):
     """Both studies beside the others' folder, of random numbers."""
     objectives = ("carbon", "thaw")
     columns = [f"zero_{name}" for name in objectives]
-    columns += [f"{name}_{what}" for name in objectives for what in ("extent", "extent_error")]
+    columns += [f"{name}_{what}" for name in objectives for what in ("extent", "extent_half_width")]
     ends = ("carbon_gain", "thaw_gain", "conifer_share", "conifer_fraction", "density_stems_ha")
     columns += [f"{name}_end_{what}" for name in objectives for what in ends]
     summary = pd.DataFrame(generator.uniform(size=(12, len(columns))), columns=columns)
@@ -472,6 +472,10 @@ def write_fronts_and_variance(folder, generator):
     shares["share"] = shares["variance"] = 1 / len(parts)
     shares = shares.assign(share_low=shares.share - 0.05, share_high=shares.share + 0.05)
     stored.write(folder / "variance" / "components.csv", shares, {})
+    quantities = ["thaw over carbon", "thaw over carbon, decided"]
+    quantities += [f"{what}, {name}" for what in ("standard deviation", "decided on a site") for name in objectives]
+    compared = pd.DataFrame({"quantity": quantities, "value": 1.0, "low": 0.9, "high": 1.1})
+    stored.write(folder / "variance" / "compared.csv", compared, {})
 
 
 BENCHMARKED = {speed.episode, speed.pure_python, speed.workers, speed.solver_share, speed.memory, speed.memory_of_all}

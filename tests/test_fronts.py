@@ -76,7 +76,17 @@ def test_front_gains_and_ends_of_a_hand_case():
     summary = fronts.summarise(hand_case())
     assert (summary["carbon_extent"], summary["thaw_extent"], summary["points"]) == (2, 3, 3)
     assert (summary["thaw_end_carbon_gain"], summary["carbon_end_thaw_gain"]) == (1, 1)
-    assert (summary["zero_carbon"], summary["zero_thaw"]) == (4.5, -4.5)
+    assert (summary["zero_carbon"], summary["zero_thaw"]) == (5, -5)
+
+
+def test_ends_are_measured_on_other_weathers_than_they_are_chosen_on():
+    table = hand_case()
+    better = (table.actions == "20 24") & (table.weather == 5)  # the best of either return, but where none is chosen
+    table.loc[better, ["carbon_return", "thaw_return"]] = [20.0, 20.0]
+    summary = fronts.summarise(table)
+    assert (summary["carbon_extent"], summary["thaw_extent"]) == (2, 3)
+    table.loc[table.actions.isin(["24 24"]) & (table.weather == 5), "thaw_return"] = -20.0
+    assert fronts.summarise(table)["thaw_extent"] < 0  # chance alone made it an end
 
 
 def test_timing_share():

@@ -166,7 +166,7 @@ def run(tmp_path, monkeypatch):
     monkeypatch.setattr(protocol, "evaluate", evaluate)
     monkeypatch.setattr(protocol, "load_policy", lambda folder: None)
     monkeypatch.setattr(generalisation.reference, "reference_returns", plans)
-    monkeypatch.setattr(generalisation.open_loop, "fingerprint", lambda: "physics")
+    monkeypatch.setattr(generalisation.reference, "physics_name", lambda: "physics")
     for name in ("studies", "runs", "archive"):
         monkeypatch.setattr(paths, name, lambda name=name: tmp_path / name)
     return folder, played

@@ -88,7 +88,7 @@ def test_more_steps_are_a_row_of_their_own(results):
     )
     words = " ".join(main_points.in_words(results).split())
     assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110 [105, 115], above 100. These" in words
-    assert "Over the best plans of these very sites it is 10.0 points." in words
+    assert "Over the best plans of these very sites it gains 10.0 points more." in words
 
 
 def test_the_words_follow_from_the_numbers(results):
@@ -107,8 +107,8 @@ def test_the_words_follow_from_the_numbers(results):
     assert followed == (
         "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. Asked for thaw instead of "
         "carbon, Group PPO keeps more cold in the ground, and PPO Gated keeps less. Variable λ EUPG does the same "
-        "whatever is asked for. (Greedy policies; said is what two intervals tell from 0, that over seeds and "
-        "sites and that over seeds alone.)"
+        "whatever is asked for. (Greedy policies; a change is named if neither interval, that over seeds "
+        "and sites or that over seeds alone, holds 0.)"
     )
 
 

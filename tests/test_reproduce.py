@@ -23,7 +23,7 @@ COUNTS = {
     "site": 45,
     "thaw": 12,
     "controls": 20,
-    "variants": 35,
+    "variants": 30,
     "mechanisms": 2,
     "difficulty": 2,
     "budgets": 35,

@@ -49,6 +49,21 @@ def test_a_small_component_may_be_estimated_below_zero():
     assert components["site"] == pytest.approx(-2) and components["site x weather"] == pytest.approx(4)
 
 
+def test_objectives_are_compared_by_what_their_returns_vary_with():
+    generator = np.random.default_rng(2)
+    sites, weathers, policies = (generator.standard_normal(n) for n in (400, 30, 30))
+    parts = 3 * sites[:, None, None] + weathers[:, None] + policies
+    one = variance.compared(np.stack([parts, 2 * parts], axis=-1))
+    assert one["standard deviation, carbon"] == pytest.approx(np.sqrt(9 * sites.var() + 1 + 1), rel=0.2)
+    assert one["thaw over carbon"] == pytest.approx(2) and one["thaw over carbon, decided"] == pytest.approx(2)
+    both = weathers.var(ddof=1) + policies.var(ddof=1)
+    assert one["decided on a site, carbon"] == pytest.approx(policies.var(ddof=1) / both)
+    table = variance.with_intervals(np.stack([parts, 2 * parts], axis=-1)[:40]).set_index("quantity")
+    assert table.loc["thaw over carbon"].tolist() == pytest.approx([2, 2, 2])
+    spread = table.loc["standard deviation, carbon"]
+    assert 0.8 * spread.value < spread.low < spread.value < spread.high < 1.2 * spread.value
+
+
 def test_what_explains_the_sites():
     generator = np.random.default_rng(1)
     features = pd.DataFrame(generator.standard_normal((400, 2)), columns=["boundary_above_air_k", "snow_mm_day"])

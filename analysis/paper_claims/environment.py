@@ -98,17 +98,13 @@ def steps_of_a_year(evidence):
     kind=IMPLEMENTATION,
 )
 def comparable_scales(evidence):
-    table = evidence.beside("variance/components.csv")
-    table = table[table.value == "return"].set_index(["objective", "component"]).variance
-    policies = ["policy", "site x policy"]
-    sd = {name: np.sqrt(table[name].sum()) for name in ("carbon", "thaw")}
-    own = {name: np.sqrt(table[name][policies].sum()) for name in sd}
-    ratio = Number(sd["thaw"] / sd["carbon"])
+    ratio = evidence.compared("thaw over carbon")
+    carbon, thaw = (evidence.compared(f"standard deviation, {name}") for name in ("carbon", "thaw"))
     rows = [
-        Row("standard deviation of the carbon return, over sites, weathers and policies", "", Number(sd["carbon"])),
-        Row("the same of the thaw return", "", Number(sd["thaw"])),
+        Row("standard deviation of the carbon return, over sites, weathers and policies", "", carbon),
+        Row("the same of the thaw return", "", thaw),
         Row("thaw over carbon", "comparable", ratio),
-        Row("thaw over carbon, of what the policy decides", "", Number(own["thaw"] / own["carbon"])),
+        Row("thaw over carbon, of what the policy decides", "", evidence.compared("thaw over carbon, decided")),
     ]
     return finding(rows, within(ratio, 0.5, 2.0, "thaw over carbon"))
 

@@ -137,6 +137,11 @@ class Evidence:
             raise Missing(f"analysis/studies/{name}.py")
         return table
 
+    def compared(self, quantity: str) -> Number:
+        """How the objectives' returns compare, by the study of variance, with its interval over resampled sites."""
+        row = self.beside("variance/compared.csv").set_index("quantity").loc[quantity]
+        return Number(row.value, row.low, row.high, "resampled sites, all under the same weathers")
+
     def beside(self, name: str, read: Callable[[Path], pd.DataFrame] = stored.read) -> pd.DataFrame:
         """A table beside the studies' folder."""
         path = self.results.studies_dir.parent / name

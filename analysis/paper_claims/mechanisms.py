@@ -429,12 +429,14 @@ CONFLICTS = (
     "Carbon and permafrost conflict: management has to trade one for the other.",
     "Abstract; section 4.3",
     FRONTS,
-    note="Non-dominated plans of single sites, found by NSGA-II; extents are between the ends of a front, and count "
-    "if both are larger than twice their standard error.",
+    note="Non-dominated plans of single sites, found by NSGA-II; extents are between the ends of a front, which are "
+    "chosen on some weathers and measured on others, and count if the intervals of both lie above zero.",
 )
 def trade_off(evidence):
     fronts = evidence.beside("fronts/summary.csv")
-    wide = (fronts.carbon_extent > 2 * fronts.carbon_extent_error) & (fronts.thaw_extent > 2 * fronts.thaw_extent_error)
+    wide = (fronts.carbon_extent > fronts.carbon_extent_half_width) & (
+        fronts.thaw_extent > fronts.thaw_extent_half_width
+    )
     wide_share = share(int(wide.sum()), len(fronts), "sites")
     rows = [
         Row("share of sites with a front that is no point", "all", wide_share),

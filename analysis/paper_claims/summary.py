@@ -80,7 +80,7 @@ SENTENCES = (
         curriculum.coin,
         "difference, paired by seed",
         "Selecting by site is worth more than selecting by a coin",
-        "Selecting by site is worth less than 25 points of score more than selecting by a coin, if anything",
+        "Selecting by site beats selecting by a coin by less than 25 points of score, if at all",
         "Whether selecting by site is worth more than selecting by a coin is open",
     ),
     Sentence(
@@ -103,10 +103,11 @@ SENTENCES = (
 def counted(verdicts: Counter, small: int) -> str:
     """The first sentence: how the directions came out, a vote a fact; small : facts that fail by that alone."""
     open_ = verdicts.total() - verdicts[HOLDS] - verdicts[FAILS]
+    numbers = verdicts[FAILS] - small
     return (
-        f"Of the {verdicts.total()} facts of the kind {DIRECTION} {verdicts[HOLDS]} hold here, {verdicts[FAILS]} do "
-        f"not hold in our simulator ({verdicts[FAILS] - small} of them because numbers say otherwise, {small} because "
-        f"no effect large enough to count is left), and {open_} are open or cannot be tested."
+        f"Of the {verdicts.total()} facts about what comes out ahead or which way a mechanism works {verdicts[HOLDS]} "
+        f"hold here, {verdicts[FAILS]} do not hold in our simulator ({numbers} of them because numbers say otherwise, "
+        f"{small} because no effect large enough to count is left), and {open_} are open or cannot be tested."
     )
 
 

@@ -18,9 +18,8 @@ import pandas as pd
 import boreal_env
 import sim
 from analysis import experiments, metrics, paths, stored
-from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import score
+from cleanrl_style.protocol import reference, score
 from cleanrl_style.protocol.reference import reference_returns
 from sim.task.preference import check_weights
 
@@ -96,10 +95,10 @@ def main(args: Args) -> None:
     folder = paths.studies(args.quick)
     sites = experiments.SITE_SEEDS[: 1 if args.quick else None]
     environments = (*ENVIRONMENTS, *MORE[: 1 if args.quick else None])
-    physics = open_loop.fingerprint()
+    physics = reference.physics_name()
     tables = {
         "constant_plans": (
-            {"episodes": args.eval_episodes, "physics": physics},
+            {"episodes": args.eval_episodes, "environments": environments, "physics": physics},
             lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in environments]),
         ),
         "constant_plans_of_sites": ({"sites": sites, "physics": physics}, lambda: study_of_sites(sites)),

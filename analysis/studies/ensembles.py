@@ -17,7 +17,6 @@ import numpy as np
 import pandas as pd
 
 from analysis import experiments, metrics, paths, stored
-from analysis.studies import open_loop
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts, reference
 
@@ -78,7 +77,7 @@ def main(args: Args) -> None:
     archive = paths.there(paths.archive())
     there = {task_id: policies_of(archive / SCRIPT / f"{task_id}-vectorization=lockstep") for task_id in TASKS}
     digest = hashlib.sha256(b"".join(file.read_bytes() for files in there.values() for file in files.values()))
-    made_by = {"episodes": episodes, "physics": open_loop.fingerprint(), "policies": digest.hexdigest()[:16]}
+    made_by = {"episodes": episodes, "physics": reference.physics_name(), "policies": digest.hexdigest()[:16]}
     if stored.is_finished(path(args.quick), made_by):
         print(f"{path(args.quick)} is finished")
         return

@@ -4,7 +4,9 @@
     python analysis/studies/fronts.py --without-mechanisms   # 3 typical ones, each mechanism of the physics off in turn
 
 A plan is an action for every block of five years. It is sought on four weathers and reported on sixteen others, as
-returns and as gains: the return less that of zero change on the same weather. Needs `pip install -e ".[planners]"`.
+returns and as gains: the return less that of zero change on the same weather. A front's ends, the plans with the
+highest mean of either return, are chosen on half of the sixteen; their gains and distance are those of the other half.
+Needs `pip install -e ".[planners]"`.
 A site is one table in results/fronts; a command that was stopped goes on with the next.
 """
 
@@ -14,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 import sim
 from analysis import paths, stored
@@ -24,6 +27,7 @@ from analysis.studies.genes import Budget
 from analysis.studies.open_loop import GAINS, RETURNS, with_gains
 from cleanrl_style import protocol
 from cleanrl_style.flags import require
+from cleanrl_style.protocol import reference
 
 YEARS = 50
 BLOCK_YEARS = 5
@@ -128,17 +132,20 @@ def timing_share(front: np.ndarray, constant: np.ndarray) -> float:
 
 
 def summarise(table: pd.DataFrame) -> dict:
-    """A site's front in a few numbers; the end with most carbon and the one with most thaw return."""
+    """A site's front in a few numbers; its ends are chosen on the first half of the weathers, measured on the others.
+
+    Measured where they are chosen, they would lie apart by chance alone.
+    """
     gains = with_gains(table)
     front, constant = plan_means(gains, "front"), plan_means(gains, "constant")
-    ends = {"thaw_end": front.iloc[0], "carbon_end": front.iloc[-1]}
-    by_weather = {
-        end: gains[(gains.kind == "front") & (gains.actions == plan.name)].set_index("weather")[GAINS]
-        for end, plan in ends.items()
-    }
-    apart = by_weather["carbon_end"] - by_weather["thaw_end"]
-    errors = apart.std() / np.sqrt(len(apart))
-    zero = (gains[RETURNS].to_numpy() - gains[GAINS].to_numpy()).mean(axis=0)
+    first, second = np.array_split(np.sort(gains.weather.unique()), 2)
+    chosen = plan_means(gains[gains.weather.isin(first)], "front")
+    others = gains[(gains.kind == "front") & gains.weather.isin(second)]
+    ends = {end: others[others.actions == chosen.index[k]] for end, k in (("thaw_end", 0), ("carbon_end", -1))}
+    by_weather = {end: rows.set_index("weather")[GAINS] for end, rows in ends.items()}
+    apart = (by_weather["carbon_end"] - by_weather["thaw_end"]) * [1.0, -1.0]
+    half_widths = stats.t.ppf(0.975, len(apart) - 1) * apart.std() / np.sqrt(len(apart))
+    zero = (others[RETURNS].to_numpy() - others[GAINS].to_numpy()).mean(axis=0)
     summary = {
         "zero_carbon": zero[0],
         "zero_thaw": zero[1],
@@ -146,10 +153,12 @@ def summarise(table: pd.DataFrame) -> dict:
         "clipped_thaw_years": front.clipped_thaw_years.mean(),
     }
     for name, gain in zip(open_loop.OBJECTIVES, GAINS, strict=True):
-        summary[f"{name}_extent"] = abs(apart[gain].mean())
-        summary[f"{name}_extent_error"] = errors[gain]
+        summary[f"{name}_extent"] = apart[gain].mean()
+        summary[f"{name}_extent_half_width"] = half_widths[gain]
     summary["timing_share"] = timing_share(front[GAINS].to_numpy(), constant[GAINS].to_numpy())
-    for end, plan in ends.items():
+    for end, rows in ends.items():
+        plan = rows[GAINS + STAND].mean()
+        plan["conifer_share"] = plan.planted_conifers_ha / plan.planted_stems_ha
         for name in (*GAINS, "conifer_share", "planted_stems_ha", "density_stems_ha", "conifer_fraction"):
             summary[f"{end}_{name}"] = plan[name]
     return summary
@@ -207,7 +216,7 @@ def main(args: Args) -> None:
         "years": YEARS,
         "block_years": BLOCK_YEARS,
         "columns": RETURNS + STAND,
-        "physics": open_loop.fingerprint(),
+        "physics": reference.physics_name(),
     }
     paths.make_writable("--output-dir", folder)
     finished = {case: stored.is_finished(path_of(folder, *case), settings | {"case": case}) for case in todo}
@@ -246,7 +255,7 @@ def main(args: Args) -> None:
 def print_summary(summary: pd.DataFrame) -> None:
     """The summary, a line a front."""
     print(
-        "\n                              boundary  snow    zero change    extent +- error                   clipped"
+        "\n                              boundary  snow    zero change    extent +- 95 %                    clipped"
         "   gains and conifer share at"
     )
     print(
@@ -257,8 +266,9 @@ def print_summary(summary: pd.DataFrame) -> None:
         print(
             f"{row.site_seed}  {row.off:17s} {row.boundary_above_air_k:7.1f} {row.snow_mm_day:5.2f} "
             f"{row.zero_carbon:+7.2f} {row.zero_thaw:+6.1f} "
-            f"{row.carbon_extent:6.2f} +-{row.carbon_extent_error:4.2f} {row.thaw_extent:5.2f} "
-            f"+-{row.thaw_extent_error:4.2f} {row.points:4d} {row.timing_share:6.0%} {row.clipped_thaw_years:6.1f}   "
+            f"{row.carbon_extent:6.2f} +-{row.carbon_extent_half_width:4.2f} {row.thaw_extent:5.2f} "
+            f"+-{row.thaw_extent_half_width:4.2f} {row.points:4d} {row.timing_share:6.0%} "
+            f"{row.clipped_thaw_years:6.1f}   "
             f"{row.thaw_end_carbon_gain:+5.2f} {row.thaw_end_thaw_gain:+6.2f} {row.thaw_end_conifer_share:4.0%}   "
             f"{row.carbon_end_carbon_gain:+5.2f} {row.carbon_end_thaw_gain:+6.2f} "
             f"{row.carbon_end_conifer_share:4.0%}"

@@ -25,6 +25,7 @@ from analysis.experiments import GENERALIST
 from analysis.studies import open_loop
 from cleanrl_style import eupg_var_lambda as eupg
 from cleanrl_style import protocol
+from cleanrl_style.protocol import reference
 
 ENV_ID = GENERALIST
 AGENT_SEED = 1
@@ -211,7 +212,7 @@ def main(args: Args) -> None:
         **design._asdict(),
         "agent_seed": AGENT_SEED,
         "first_seed": FIRST_SEED,
-        "physics": open_loop.fingerprint(),
+        "physics": reference.physics_name(),
     }
     if stored.is_finished(path, settings):
         print(f"{path} is finished")

@@ -4,7 +4,6 @@ A site here is its 62 parameters and the stand that it starts with; a weather is
 included. Every weather can be played on every site and under every plan, so that differences are paired.
 """
 
-import hashlib
 from typing import NamedTuple
 
 import numpy as np
@@ -81,15 +80,6 @@ def rewards_of_year(record, actions) -> np.ndarray:
     """The paper's [carbon, thaw] of a year, (n, 2); record (n, columns of sim.RECORD_NAMES), actions (n,)."""
     parts = boreal_env.rewards_of_year(record, actions, boreal_env.Reward(), "asymmetric")
     return np.column_stack([parts[f"{name}_reward"] for name in OBJECTIVES])
-
-
-def fingerprint() -> str:
-    """Hash of the rewards of random plans on 64 sites, rounded: the same while the simulator's numbers are."""
-    numbers = range(64)
-    sites = [sim.sample_site(FIRST_SITE_SEED + k) for k in numbers]
-    plans = np.random.default_rng(0).integers(sim.management.NUM_ACTIONS, size=(len(sites), 10))
-    rewards = play(sites, [seeds(FIRST_SITE_SEED + k, k) for k in numbers], plans).rewards
-    return hashlib.sha256((1e6 * rewards).round().astype(int).tobytes()).hexdigest()[:16]
 
 
 def valid_actions(stocks) -> np.ndarray:

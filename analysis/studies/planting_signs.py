@@ -21,6 +21,7 @@ from analysis import paths, stored
 from analysis.studies import open_loop, sensitivity
 from analysis.studies.sensitivity import DEFAULT, Variant
 from cleanrl_style import protocol
+from cleanrl_style.protocol import reference
 from sim.stands import available_cores
 
 YEARS = 50
@@ -88,7 +89,7 @@ def play_all(chosen: list[Variant], args: Args, played) -> pd.DataFrame:
 
 def settings(args: Args) -> dict:
     """What a table hangs on; another simulator or step makes it stale."""
-    physics = open_loop.fingerprint()
+    physics = reference.physics_name()
     return {"sites": args.sites, "years": args.years, "share": sensitivity.SHARE, "physics": physics}
 
 

@@ -22,6 +22,7 @@ from analysis import stored
 from analysis.paths import make_writable
 from analysis.studies import open_loop
 from cleanrl_style import protocol
+from cleanrl_style.protocol import reference
 from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.stands import available_cores
 
@@ -349,7 +350,7 @@ def main(args: Args) -> None:
         "weathers": WEATHERS,
         "years": YEARS,
         "share": SHARE,
-        "physics": open_loop.fingerprint(),
+        "physics": reference.physics_name(),
     }
     groups: dict[str, list[Variant]] = {}
     for variant in everything:

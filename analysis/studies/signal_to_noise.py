@@ -31,6 +31,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
+from cleanrl_style.protocol.reference import physics_name
 from sim.draws import streams_of
 
 YEARS = 50
@@ -396,7 +397,7 @@ def main(args: Args) -> None:
         "actions": ACTIONS,
         "contrasts": CONTRASTS,
         "weightings": WEIGHTINGS,
-        "physics": open_loop.fingerprint(),
+        "physics": physics_name(),
     }
     if all(stored.is_finished(path, settings) for path in files):
         print(f"{files[-1]} is finished")

@@ -3,12 +3,13 @@
     python analysis/studies/site_choice.py      # three minutes on two idle cores
 
 The constant plans that are best anywhere are played on sampled sites, each with one first stand under several weathers
-and dice, the same for all plans. Three ways to choose: one plan for all sites; for each site the best one on the very
-dice that it is judged on, which no agent can know; and for each site the best one on all other dice, a little less
-than what an agent could that knew the site to perfection. Leaves results/studies/site_choice.csv, a row a task and
+and dice of its own, the same for all plans. Three ways to choose: one plan for all sites; for each site the best one on
+the very dice that it is judged on, which no agent can know; and for each site the best one on all other dice, a little
+less than what an agent could that knew the site to perfection. Leaves results/studies/site_choice.csv, a row a task and
 weight, and weight "all", in which gains are scores: 100 is one plan for all sites, its own for each weight.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts
+from cleanrl_style.protocol import fronts, reference
 
 YEARS = 50
 SITES, DICE = 64, 8
@@ -48,10 +49,13 @@ class Args:
     """2 sites, 2 dice, 3 years: to see that it runs, into results/quick/studies"""
 
 
-def play(task: str, sites: int, dice: int, years: int, progress) -> np.ndarray:
-    """Gains over doing nothing of every plan, (plans, sites, dice, 2)."""
+def play(task: str, dice_of_site: dict[int, Sequence[int]], years: int, progress) -> np.ndarray:
+    """Gains over doing nothing of every plan, (plans, sites, dice, 2).
+
+    dice_of_site : number of a site -> numbers of its dice, as many for each.
+    """
     arguments, carbon_scale = TASKS[task]
-    design = [(site, die, plan) for site in range(sites) for die in range(dice) for plan in PLANS]
+    design = [(site, die, plan) for site, dice in dice_of_site.items() for die in dice for plan in PLANS]
     returns = []
     for first in range(0, len(design), CHUNK):
         part = design[first : first + CHUNK]
@@ -69,7 +73,7 @@ def play(task: str, sites: int, dice: int, years: int, progress) -> np.ndarray:
         ]
         returns.append(sum(np.column_stack([one["carbon_reward"], one["thaw_reward"]]) for one in rewards))
         progress()
-    table = np.concatenate(returns).reshape(sites, dice, len(PLANS), 2).transpose(2, 0, 1, 3)
+    table = np.concatenate(returns).reshape(len(dice_of_site), -1, len(PLANS), 2).transpose(2, 0, 1, 3)
     return table - table[:1]
 
 
@@ -117,16 +121,15 @@ def main(args: Args) -> None:
     sites, dice, years = (2, 2, 3) if args.quick else (args.sites, args.dice, YEARS)
     if sites < 2 or dice < 2:
         protocol.fail(f"--sites {sites} --dice {dice}: 2 or more of both are allowed")
-    made_by = {"sites": sites, "dice": dice, "years": years, "physics": open_loop.fingerprint()}
+    made_by = {"sites": sites, "dice": dice, "years": years, "physics": reference.physics_name()}
     if stored.is_finished(path(args.quick), made_by):
         print(f"{path(args.quick)} is finished")
         return
     chunks = -(-sites * dice * len(PLANS) // CHUNK) * len(TASKS)
     progress, done = protocol.Progress("site_choice", chunks, "chunks"), iter(range(1, chunks + 1))
+    every = {site: range(site * dice, (site + 1) * dice) for site in range(sites)}
     rows = [
-        row
-        for task in TASKS
-        for row in summarise(task, play(task, sites, dice, years, lambda: progress.show(next(done))))
+        row for task in TASKS for row in summarise(task, play(task, every, years, lambda: progress.show(next(done))))
     ]
     table = pd.DataFrame(rows)
     stored.write(path(args.quick), table, made_by)

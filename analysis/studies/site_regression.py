@@ -3,10 +3,11 @@
     python analysis/studies/site_regression.py      # nine minutes on two idle cores
 
 `site_choice.py` asks what there is to gain by knowing a site; this study, how much of it the site's parameters tell one
-who has tried every plan on hundreds of sites. The constant plans that are best anywhere are played on sampled sites,
-one episode each, the same weather and dice for all. A ridge regression from the parameters to each plan's gain is
-fitted on seven eighths of the sites and chooses for the last, in turn. Leaves results/studies/site_regression.csv, a
-row a task and weight, and weight "all": scores, where 100 is one plan for all sites, its own for each weight.
+who has tried every plan on hundreds of sites. The constant plans that are best anywhere are played on other sampled
+sites, one episode each, with weather and dice of the site's own, the same for all plans (of dice that all sites share a
+regression would learn the luck). A ridge regression from the parameters to each plan's gain is fitted on seven eighths
+of the sites and chooses for the last, in turn. Leaves results/studies/site_regression.csv, a row a task and weight, and
+weight "all": scores, where 100 is one plan for all sites, its own for each weight.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop, site_choice
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts
+from cleanrl_style.protocol import fronts, reference
 
 SITES = 768
 FOLDS = 8
@@ -91,16 +92,18 @@ def main(args: Args) -> None:
     sites, years = (16, 2) if args.quick else (args.sites, site_choice.YEARS)
     if sites < 2 * FOLDS:
         protocol.fail(f"--sites {sites}: {2 * FOLDS} or more are allowed")
-    made_by = {"sites": sites, "years": years, "physics": open_loop.fingerprint()}
+    made_by = {"sites": sites, "years": years, "physics": reference.physics_name()}
     if stored.is_finished(path(args.quick), made_by):
         print(f"{path(args.quick)} is finished")
         return
-    parameters = [list(sim.sample_site(open_loop.FIRST_SITE_SEED + site).values()) for site in range(sites)]
+    others = site_choice.SITES * site_choice.DICE  # dice that site_choice.py has
+    dice = {site: [others + site] for site in range(site_choice.SITES, site_choice.SITES + sites)}
+    parameters = [list(sim.sample_site(open_loop.FIRST_SITE_SEED + site).values()) for site in dice]
     chunks = -(-sites * len(site_choice.PLANS) // site_choice.CHUNK) * len(site_choice.TASKS)
     progress, done = protocol.Progress("site_regression", chunks, "chunks"), iter(range(1, chunks + 1))
     rows = []
     for task in site_choice.TASKS:
-        gains = site_choice.play(task, sites, 1, years, lambda: progress.show(next(done)))[:, :, 0]
+        gains = site_choice.play(task, dice, years, lambda: progress.show(next(done)))[:, :, 0]
         rows += summarise(task, np.array(parameters), gains)
     table = pd.DataFrame(rows)
     stored.write(path(args.quick), table, made_by)

@@ -17,6 +17,7 @@ import sim
 from analysis import results, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
+from cleanrl_style.protocol import reference
 
 YEARS = 50
 EACH = 60  # episodes of each kind and run
@@ -74,7 +75,7 @@ def main(args: Args) -> None:
     each, years = (2, 5) if args.quick else (EACH, YEARS)
     path = found.studies_dir / "site_warming.csv"
     seeds = [curriculum.runs[0].arguments["seed"] for curriculum in curricula]
-    settings = {"seeds": seeds, "each": each, "years": years, "physics": open_loop.fingerprint()}
+    settings = {"seeds": seeds, "each": each, "years": years, "physics": reference.physics_name()}
     if stored.is_finished(path, settings):
         print(f"{path} is finished")
         return

@@ -20,6 +20,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
+from cleanrl_style.protocol import reference
 
 YEARS = 50
 FACTORS = ("site", "weather", "policy")
@@ -130,6 +131,35 @@ def split_years(rewards: np.ndarray) -> pd.DataFrame:
     return table.rename_axis("component").reset_index()
 
 
+def compared(returns: np.ndarray) -> dict[str, float]:
+    """The objectives' standard deviations and their ratio, of all and of what the policy decides; its share on a site.
+
+    returns : (sites, weathers, policies, 2), carbon then thaw. What the policy decides is its component and that of
+    site x policy; its share on a site is of what is left without the site's.
+    """
+    components = {name: variance_components(returns[..., k]) for k, name in enumerate(open_loop.OBJECTIVES)}
+    decided = {name: of["policy"] + of["site x policy"] for name, of in components.items()}
+    sd = {name: np.sqrt(of.sum()) for name, of in components.items()}
+    return {
+        **{f"standard deviation, {name}": value for name, value in sd.items()},
+        "thaw over carbon": sd["thaw"] / sd["carbon"],
+        "thaw over carbon, decided": np.sqrt(decided["thaw"] / decided["carbon"]),
+        **{f"decided on a site, {name}": decided[name] / of.drop("site").sum() for name, of in components.items()},
+    }
+
+
+def with_intervals(returns: np.ndarray) -> pd.DataFrame:
+    """`compared` with its 95 % intervals over resampled sites, a row a quantity."""
+    generator = np.random.default_rng(0)
+    resampled = pd.DataFrame(
+        [compared(returns[generator.integers(len(returns), size=len(returns))]) for _ in range(REPETITIONS)]
+    )
+    table = pd.DataFrame(
+        {"value": compared(returns), "low": resampled.quantile(0.025), "high": resampled.quantile(0.975)}
+    )
+    return table.rename_axis("quantity").reset_index()
+
+
 def site_effect(site_means: np.ndarray, features: pd.DataFrame) -> dict[str, float]:
     """Shares of the variance between sites that linear regressions explain, adjusted for their number of terms.
 
@@ -159,7 +189,7 @@ def main(args: Args) -> None:
         sys.exit(f"variance.py: --sites >= 4 and --weathers >= 2 are allowed, not {args.sites}, {args.weathers}")
     folder = args.output_dir or paths.results(args.quick) / "variance"
     paths.make_writable("--output-dir", folder)
-    settings = asdict(args) | {"output_dir": None, "physics": open_loop.fingerprint()}
+    settings = asdict(args) | {"output_dir": None, "physics": reference.physics_name()}
     site_seeds = [open_loop.FIRST_SITE_SEED + k for k in range(args.sites)]
     rewards = play(site_seeds, args.weathers)
     returns = rewards.sum(axis=3)
@@ -180,7 +210,13 @@ def main(args: Args) -> None:
     policies.insert(0, "policy", list(POLICIES))
     index = pd.MultiIndex.from_product([site_seeds, range(args.weathers), POLICIES], names=FACTORS)
     episodes = pd.DataFrame(values.reshape(-1, 4), index=index, columns=columns).reset_index()
-    tables = {"components": components, "site_effect": explained, "policies": policies, "episodes": episodes}
+    tables = {
+        "components": components,
+        "compared": with_intervals(returns),
+        "site_effect": explained,
+        "policies": policies,
+        "episodes": episodes,
+    }
     for name, table in tables.items():
         stored.write(folder / f"{name}.csv", table, settings)
     report(components, explained, policies)

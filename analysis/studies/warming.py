@@ -20,6 +20,7 @@ import sim
 from analysis import make_scenarios, metrics, paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
+from cleanrl_style.protocol import reference
 from sim.scenario import FIRST_YEAR, check_scenario
 from sim.task.episodes import BALANCED_WORLD
 
@@ -57,7 +58,9 @@ def play(scenario: str, sites: int, years: int, plans: list[int]) -> dict[str, n
     # The first state hangs on no plan: it is spun up once.
     first = sim.Stands(sites, **BALANCED_WORLD)
     first.start(
-        everyone, [sim.sample_site(k) for k in numbers[:sites]], [open_loop.seeds(k, 0) for k in numbers[:sites]]
+        everyone,
+        [sim.sample_site(number) for number in numbers[:sites]],
+        [open_loop.seeds(number, k) for k, number in enumerate(numbers[:sites])],
     )
     state = first.get_state()
     stands.set_state({name: _repeated(values, len(plans)) for name, values in state.items()})
@@ -241,7 +244,8 @@ def answer(table: pd.DataFrame, ground: pd.Series) -> str:
     for name, count in held(ground).items():
         reached = [0.0, *rows.warming_k]
         lost = [k for k, sites in enumerate(rows[name], start=1) if sites < count / 2]
-        where = "between {:.1f} and {:.1f} K".format(*reached[lost[0] - 1 :]) if lost else "at none that is reached"
+        between = reached[lost[0] - 1 :] if lost else reached[-1:]
+        where = ("between {:.1f} and {:.1f} K" if lost else "never, up to {:.1f} K").format(*between)
         sites = (f"{sites} at {warming:.1f} K" for warming, sites in zip(rows.warming_k, rows[name], strict=True))
         parts.append(f"- Ground {name}: {where}. Of {count} sites some plan keeps {', '.join(sites)}.")
     return "\n".join(parts)
@@ -258,7 +262,7 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         f"without a scenario and under three, from {start} to {end}, on {sites} sites; what a scenario is, is in "
         "[model.md](model.md), section 3. **Warming** is always that of boreal land against 1995-2014, in the mean of "
         "ten years; where it is the world's, that is said.",
-        f"**By {last}, at which warming does even the best plan lose more than half of the sites?** It hangs on how "
+        f"**By {last}, how much warming makes even the best plan lose more than half of the sites?** It hangs on how "
         "cold the ground is:",
         f"Frozen is ground that thaws less than {NEAR_SURFACE_M:.0f} m in each of ten years. In effect that is a deep "
         "node below 0 °C: where its mean passes 0 °C the modelled depth leaps by a metre or more. The ground's "
@@ -424,7 +428,7 @@ def main(args: Args) -> None:
     if args.sites == Args.sites and not PAGE.parent.is_dir():
         protocol.fail(f"{PAGE}: no such folder here; this is run in the project's folder")
     folder = paths.studies(args.quick)
-    made_by = {"sites": args.sites, "years": years, "plans": plans, "physics": open_loop.fingerprint()}
+    made_by = {"sites": args.sites, "years": years, "plans": plans, "physics": reference.physics_name()}
     tables = [folder / "warming.csv", folder / "warming_years.csv"]
     if all(stored.is_finished(path, made_by) for path in tables):
         print(f"{tables[0]} is finished")
