@@ -268,8 +268,8 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         "node below 0 °C: where its mean passes 0 °C the modelled depth leaps by a metre or more. The ground's "
         f"temperature is that of the deep soil in {last}, without a scenario and without management. All are the same "
         f"{len(ground)} of {sites} sites, those frozen in {first} and in {last} without a scenario. The table goes "
-        "by the warming that is reached. That is no threshold: the ground lags behind the warming, and without a "
-        "scenario it goes on cooling, so that at the same warming more of it is frozen later:",
+        "by the warming that is reached. That is no threshold: the ground lags behind the warming, and "
+        "without a scenario, too, it changes from decade to decade, as below:",
         drift(plans, years, today, first, last),
         f"**How does that compare with what is published?** Under no change, {last} against the same years without a "
         "scenario. Thaw is the median, with its range, of the sites that are frozen in both; volume is of the sites "
