@@ -23,7 +23,16 @@ from analysis.paper_claims.claim import (
     finding,
     within,
 )
-from analysis.paper_claims.evidence import VARIANCE, difference, first_and_last, mean_of, only, optional, seeds
+from analysis.paper_claims.evidence import (
+    SAME_WEATHERS,
+    VARIANCE,
+    difference,
+    first_and_last,
+    mean_of,
+    only,
+    optional,
+    seeds,
+)
 from analysis.studies.constant_plans import as_evaluation, best_gains, of_environment
 from analysis.tables import single_sites
 
@@ -307,7 +316,7 @@ def share(evidence, objective: str, component: str) -> Number:
     """Share of a component in the variance of 50-year returns, with its interval over resampled sites."""
     table = evidence.beside("variance/components.csv")
     row = table[(table.value == "return") & (table.objective == objective)].set_index("component").loc[component]
-    return Number(row.share, row.share_low, row.share_high, "resampled sites, all under the same weathers")
+    return Number(row.share, row.share_low, row.share_high, SAME_WEATHERS)
 
 
 @claim(

@@ -269,7 +269,7 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         f"temperature is that of the deep soil in {last}, without a scenario and without management. All are the same "
         f"{len(ground)} of {sites} sites, those frozen in {first} and in {last} without a scenario. The table goes "
         "by the warming that is reached. That is no threshold: the ground lags behind the warming, and "
-        "without a scenario, too, it changes from decade to decade, as below:",
+        "without a scenario, too, it changes from decade to decade (below the figure):",
         drift(plans, years, today, first, last),
         f"**How does that compare with what is published?** Under no change, {last} against the same years without a "
         "scenario. Thaw is the median, with its range, of the sites that are frozen in both; volume is of the sites "
