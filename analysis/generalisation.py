@@ -85,6 +85,13 @@ def _share(ours: float, known: float) -> float:
     return min(ours / known, 1.0) if known > 0.0 else np.nan
 
 
+def by_site(table: pd.DataFrame, columns: list[str]) -> dict[int, np.ndarray]:
+    """Points (n, m) of each site, by its seed, ascending."""
+    ordered = table.sort_values("site_seed", kind="stable")
+    seeds, first = np.unique(ordered.site_seed, return_index=True)
+    return dict(zip(seeds.tolist(), np.split(ordered[columns].to_numpy(dtype=float), first[1:]), strict=True))
+
+
 def ratios(policies: Mapping[str, pd.DataFrame], best: pd.DataFrame) -> pd.DataFrame:
     """A row a policy and site, with `policy`, `site_seed` and `RATIOS`.
 
@@ -92,12 +99,12 @@ def ratios(policies: Mapping[str, pd.DataFrame], best: pd.DataFrame) -> pd.DataF
     site is that of all policies and its best known front together, so add all that are compared.
     """
     columns = metrics.return_columns(metrics.objectives_of(best.columns))
-    known = {seed: rows[columns].to_numpy(dtype=float) for seed, rows in best.groupby("site_seed")}
+    known = by_site(best, columns)
     points: dict[str, dict] = {}
     for name, table in policies.items():
         if not set(columns) <= set(table.columns):
             raise ValueError(f"policy {name}: returns of {', '.join(columns)} are needed")
-        points[name] = {seed: rows[columns].to_numpy(dtype=float) for seed, rows in table.groupby("site_seed")}
+        points[name] = by_site(table, columns)
         other = sorted(set(points[name]) ^ set(known))
         if other:
             raise ValueError(f"policy {name}: site {other[0]} has not both the policy's and a best known front")

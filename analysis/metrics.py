@@ -7,6 +7,8 @@ first's), `seed` (of the episode: the same seed is the same site and weather und
 """
 
 import bisect
+import copy
+import functools
 
 import numpy as np
 import pandas as pd
@@ -211,6 +213,18 @@ def plans_of_sites(plans: pd.DataFrame, weights: np.ndarray) -> np.ndarray:
     return np.einsum("mas,km->aks", np.array(cube), weights)
 
 
+@functools.lru_cache(maxsize=4)
+def sets_of_sites(sites: int, repetitions: int) -> tuple[np.ndarray, np.random.Generator]:
+    """Shares of the sites in sets of as many that are drawn anew, (sets, sites), and the generator after them.
+
+    Kept, since drawing them takes longer than all that is done with them: copy the generator to draw seeds.
+    """
+    generator = np.random.default_rng(0)
+    shares = generator.multinomial(sites, np.full(sites, 1 / sites), repetitions) / sites
+    shares.flags.writeable = False
+    return shares, generator
+
+
 def score_interval(
     gained: np.ndarray, plans: np.ndarray | None, repetitions: int = 20_000
 ) -> tuple[float, float, float]:
@@ -235,8 +249,9 @@ def score_interval(
     middle = iqm(of(np.full((1, sites), 1 / sites))[0])
     if seeds < 2:
         return middle, np.nan, np.nan
-    generator = np.random.default_rng(0)
-    scores = of(generator.multinomial(sites, np.full(sites, 1 / sites), repetitions) / sites)
+    shares, generator = sets_of_sites(sites, repetitions)
+    generator = copy.deepcopy(generator)
+    scores = of(shares)
     drawn = generator.integers(seeds, size=(repetitions, seeds))
     values = scipy.stats.trim_mean(np.take_along_axis(scores, drawn, axis=1), 0.25, axis=1)
     low, high = np.nanpercentile(values, [2.5, 97.5])
@@ -250,8 +265,8 @@ def difference_interval(first, second, repetitions: int = 20_000) -> tuple[float
     row is a fixed plan, or a single training, whose part of the interval is lacking. Deterministic.
     """
     first, second = (np.asarray(gained, dtype=float) for gained in (first, second))
-    sites, generator = first.shape[1], np.random.default_rng(0)
-    shares = generator.multinomial(sites, np.full(sites, 1 / sites), repetitions) / sites
+    shares, generator = sets_of_sites(first.shape[1], repetitions)
+    generator = copy.deepcopy(generator)
 
     def drawn(gained):
         seeds = generator.integers(len(gained), size=(repetitions, len(gained)))

@@ -1,7 +1,7 @@
 """What tables and figures are made of: the runs that exist, sorted into the experiments' rows, and the studies."""
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +87,8 @@ class Results:
     def __init__(self, roots: tuple[Path, ...], jobs: list[experiments.Job], studies_dir: Path):
         self.roots, self.jobs, self.studies_dir = roots, jobs, studies_dir
         self.runs, self.left_out = runs.read_runs(*roots)
+        self.zero_change = cache(self._zero_change)
+        self.constant_plans_in = cache(self._constant_plans_in)
         self.missing = [job for job in jobs if not job.is_study and not any(job.made(run.config) for run in self.runs)]
 
     @staticmethod
@@ -171,7 +173,7 @@ class Results:
         known = longest is not None and set(evaluation.seed) <= set(longest.seed)
         return metrics.gains(evaluation, longest) if known else None
 
-    def zero_change(self, env_id, thaw_formulation, site_seed) -> pd.DataFrame | None:
+    def _zero_change(self, env_id, thaw_formulation, site_seed) -> pd.DataFrame | None:
         """Episodes of zero change under these conditions, of all its runs and of that constant plan; None without."""
         conditions = {"env_id": env_id, "thaw_formulation": thaw_formulation, "site_seed": site_seed}
         same = [
@@ -183,7 +185,7 @@ class Results:
         same += [] if plans is None else [plans[plans.action == NO_CHANGE]]
         return pd.concat(same, ignore_index=True).drop_duplicates("seed") if same else None
 
-    def constant_plans_in(self, env_id, thaw_formulation, site_seed) -> pd.DataFrame | None:
+    def _constant_plans_in(self, env_id, thaw_formulation, site_seed) -> pd.DataFrame | None:
         """The study of constant plans under these conditions, with the returns of the environment's objectives."""
         if self.constant_plans is None or thaw_formulation != "asymmetric" or site_seed is not None:
             return None

@@ -19,8 +19,6 @@ BALANCED = ("--env-id", "boreal-balanced-v0")
     ("folder", "flags"),
     [
         ("ppo_group/boreal-generalist-v0-vectorization=lockstep", ()),
-        ("ppo_group/boreal-balanced-v0-vectorization=lockstep", BALANCED),
-        ("ppo_group/boreal-generalist-v0-reward_scales=1.11,1-vectorization=lockstep", ("--reward-scales", 1.11, 1)),
         ("ppo_gated/boreal-generalist-v0-vectorization=lockstep", ()),
         ("ppo_curriculum/boreal-balanced-v0-vectorization=lockstep", BALANCED),
     ],
