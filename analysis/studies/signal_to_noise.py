@@ -119,9 +119,10 @@ def advance(stands: sim.Stands, orders: np.ndarray) -> np.ndarray:
     return rewards
 
 
-def branch(state: dict, rows, seeds) -> sim.Stands:
-    """Stands that go on from rows of a `sim.Stands.get_state`, each with its own dice from here on."""
-    stands = sim.Stands(len(rows))
+def branch(state: dict, rows, seeds, **arguments) -> sim.Stands:
+    """Stands that go on from rows of a `sim.Stands.get_state`, each with its own dice from here on; arguments : of
+    `sim.Stands`."""
+    stands = sim.Stands(len(rows), **arguments)
     chosen = {name: state[name][rows] for name in ("parameters", "state", "record", "years")}
     stands.set_state({**chosen, "streams": np.array([streams_of(one) for one in seeds]), "seeds": seeds})
     return stands
