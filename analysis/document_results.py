@@ -464,6 +464,7 @@ EXCERPTS = {
     "times": excerpts.times,
     "misses": excerpts.missing,
     "knowing_the_site": excerpts.knowing_the_site,
+    "looking_at_the_stand": excerpts.looking_at_the_stand,
     "gradient": excerpts.gradient,
 }
 

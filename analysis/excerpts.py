@@ -11,7 +11,7 @@ from scipy import stats
 
 from analysis import methods, paths, stored
 from analysis.studies import boreal_map as region_map
-from analysis.studies import site_choice, site_regression
+from analysis.studies import replanning, site_choice, site_regression
 from cleanrl_style import protocol
 
 VALIDATION = Path("docs/validation.md")
@@ -191,6 +191,22 @@ def knowing_the_site() -> str:
         "its deviation between sites",
     ]
     return markdown([*header, "between dice of a site"], rows)
+
+
+def looking_at_the_stand() -> str:
+    """What choosing a plan anew is worth; the tables in results/studies/replanning have every weight."""
+    rows = []
+    for task in replanning.TASKS:
+        if not replanning.path(task).exists():
+            return f"Not run yet: `python {replanning.__name__.replace('.', '/')}.py`.\n"
+        row = stored.read(replanning.path(task)).iloc[-1]
+        shown = [
+            f"{row[name]:.1f} [{row[f'{name}_low']:.1f}, {row[f'{name}_high']:.1f}]"
+            for name in (*replanning.WAYS[1:], "anew_less_once")
+        ]
+        rows.append([f"`{task}`", "100", *shown, f"{row.plan_changed:.0%}"])
+    header = ["task", "one plan for all sites", "chosen at the start", "chosen anew every ten years", "what that adds"]
+    return markdown([*header, "choices that change the plan"], rows)
 
 
 def conifers_less_deciduous(row: pd.Series) -> str:

@@ -685,3 +685,19 @@ def test_a_users_tables_lie_beside_the_users_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     make_tables.main(make_tables.Args(runs_dir=(TINY_RUNS,)))
     assert {path.relative_to(tmp_path).parts[:2] for path in tmp_path.rglob("*.csv")} == {("runs", "tables")}
+
+
+def test_the_committed_tables_are_of_the_committed_runs():
+    """As many seeds a row as the archive has folders; others are rows of other tables."""
+    table = pd.read_csv(ROOT / "results" / "tables" / "main_results.csv")
+    made = {
+        (row.method, row.environment, frozenset(row.setting.removeprefix("default").split(", "))): row.seeds
+        for row in table.itertuples()
+    }
+    others = re.compile("eupg_fixed_lambda|preference=|thaw_formulation=|boreal-(?!generalist|balanced)")
+    rows = [path for path in (ROOT / "results" / "runs").glob("*/*") if not others.search(str(path))]
+    assert len(rows) > 30
+    for path in rows:
+        env_id, version, setting = path.name.partition("-v0")
+        key = path.parent.name, env_id + version, frozenset(setting.removeprefix("-").split("-"))
+        assert made.get(key) == len(list(path.glob("seed*"))), f"{key}: make_tables.py, as results/README.md says"
