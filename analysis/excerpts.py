@@ -206,7 +206,9 @@ def looking_at_the_stand() -> str:
         ]
         rows.append([f"`{task}`", "100", *shown, f"{row.plan_changed:.0%}"])
     header = ["task", "one plan for all sites", "chosen at the start", "chosen anew every ten years", "what that adds"]
-    return markdown([*header, "choices that change the plan"], rows)
+    made = stored.settings(replanning.path(task))
+    design = f"{made['sites']} sites, episodes on each: {made['dice']}; other weathers and dice: {made['futures']}."
+    return markdown([*header, "choices that change the plan"], rows) + f"\n{design}\n"
 
 
 def conifers_less_deciduous(row: pd.Series) -> str:

@@ -213,12 +213,14 @@ def plans_of_sites(plans: pd.DataFrame, weights: np.ndarray) -> np.ndarray:
     return np.einsum("mas,km->aks", np.array(cube), weights)
 
 
-@functools.lru_cache(maxsize=4)
 def sets_of_sites(sites: int, repetitions: int) -> tuple[np.ndarray, np.random.Generator]:
-    """Shares of the sites in sets of as many that are drawn anew, (sets, sites), and the generator after them.
+    """Shares of the sites in sets of as many that are drawn anew, (sets, sites), and a generator to draw seeds by."""
+    shares, generator = _sets_of_sites(sites, repetitions)
+    return shares, copy.deepcopy(generator)
 
-    Kept, since drawing them takes longer than all that is done with them: copy the generator to draw seeds.
-    """
+
+@functools.lru_cache(maxsize=4)  # drawing takes longer than all that is done with them
+def _sets_of_sites(sites: int, repetitions: int) -> tuple[np.ndarray, np.random.Generator]:
     generator = np.random.default_rng(0)
     shares = generator.multinomial(sites, np.full(sites, 1 / sites), repetitions) / sites
     shares.flags.writeable = False
@@ -250,7 +252,6 @@ def score_interval(
     if seeds < 2:
         return middle, np.nan, np.nan
     shares, generator = sets_of_sites(sites, repetitions)
-    generator = copy.deepcopy(generator)
     scores = of(shares)
     drawn = generator.integers(seeds, size=(repetitions, seeds))
     values = scipy.stats.trim_mean(np.take_along_axis(scores, drawn, axis=1), 0.25, axis=1)
@@ -266,7 +267,6 @@ def difference_interval(first, second, repetitions: int = 20_000) -> tuple[float
     """
     first, second = (np.asarray(gained, dtype=float) for gained in (first, second))
     shares, generator = sets_of_sites(first.shape[1], repetitions)
-    generator = copy.deepcopy(generator)
 
     def drawn(gained):
         seeds = generator.integers(len(gained), size=(repetitions, len(gained)))

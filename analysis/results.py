@@ -87,6 +87,7 @@ class Results:
     def __init__(self, roots: tuple[Path, ...], jobs: list[experiments.Job], studies_dir: Path):
         self.roots, self.jobs, self.studies_dir = roots, jobs, studies_dir
         self.runs, self.left_out = runs.read_runs(*roots)
+        # every replicate asks for them, and a few answers serve all
         self.zero_change = cache(self._zero_change)
         self.constant_plans_in = cache(self._constant_plans_in)
         self.missing = [job for job in jobs if not job.is_study and not any(job.made(run.config) for run in self.runs)]

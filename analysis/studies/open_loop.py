@@ -19,6 +19,7 @@ FIRST_WEATHER_SEED = 4_000_000_000
 CANDIDATES = 400
 
 OBJECTIVES = ("carbon", "thaw")
+PAPERS_REWARD = boreal_env.Reward()
 RETURNS, GAINS = ([f"{name}_{what}" for name in OBJECTIVES] for what in ("return", "gain"))
 _COLUMN = {name: i for i, name in enumerate(sim.RECORD_NAMES)}
 _HARVESTABLE = slice(sim.demography.AGE_CLASSES.index("young"), None)  # the environment's default
@@ -76,9 +77,10 @@ def play(sites, seeds, plans, *, initial=None, **arguments) -> Episodes:
     return Episodes(rewards, actions, record, start)
 
 
-def rewards_of_year(record, actions) -> np.ndarray:
-    """The paper's [carbon, thaw] of a year, (n, 2); record (n, columns of sim.RECORD_NAMES), actions (n,)."""
-    parts = boreal_env.rewards_of_year(record, actions, boreal_env.Reward(), "asymmetric")
+def rewards_of_year(record, actions, reward=PAPERS_REWARD) -> np.ndarray:
+    """[carbon, thaw] of a year, the paper's unless told, (n, 2); record (n, columns of sim.RECORD_NAMES), actions
+    (n,)."""
+    parts = boreal_env.rewards_of_year(record, actions, reward, "asymmetric")
     return np.column_stack([parts[f"{name}_reward"] for name in OBJECTIVES])
 
 

@@ -58,8 +58,7 @@ class Args:
 def step(stands: sim.Stands, plans: np.ndarray, reward: boreal_env.Reward) -> np.ndarray:
     """A year of each stand's plan, where it can be carried out; rewards (n, 2)."""
     actions = boreal_env.where_valid(plans, open_loop.valid_actions(stands.stocks(np.arange(stands.number))))
-    parts = boreal_env.rewards_of_year(stands.step(actions), actions, reward, "asymmetric")
-    return np.column_stack([parts["carbon_reward"], parts["thaw_reward"]])
+    return open_loop.rewards_of_year(stands.step(actions), actions, reward)
 
 
 def to_go(state: dict, rows: np.ndarray, seeds: list[sim.Seeds], years: int, arguments, reward) -> np.ndarray:

@@ -67,11 +67,11 @@ def play(task: str, dice_of_site: dict[int, Sequence[int]], years: int, progress
             **arguments,
         )
         reward = boreal_env.Reward(carbon_scale=carbon_scale)
-        rewards = [
-            boreal_env.rewards_of_year(episodes.record[:, year], episodes.actions[:, year], reward, "asymmetric")
+        rewards = (
+            open_loop.rewards_of_year(episodes.record[:, year], episodes.actions[:, year], reward)
             for year in range(years)
-        ]
-        returns.append(sum(np.column_stack([one["carbon_reward"], one["thaw_reward"]]) for one in rewards))
+        )
+        returns.append(sum(rewards))
         progress()
     table = np.concatenate(returns).reshape(len(dice_of_site), -1, len(PLANS), 2).transpose(2, 0, 1, 3)
     return table - table[:1]
