@@ -31,7 +31,7 @@ class Args:
 
     # Algorithm
     screening: float = 0.2
-    """share of the steps in which all 21 plans are played; in the others those few that came closest to the best"""
+    """share of the steps in which all 21 plans are played, at least a round; then those that came closest to the best"""
     finalists: Literal[3, 4, 6, 7, 12, 21] = 6
     """how many are played on; divides the number of environments, 84"""
     ridge: float = 100.0
@@ -138,9 +138,9 @@ if __name__ == "__main__":
         protocol.fail(f"--env-id {args.env_id}: the plans are of the boreal environments alone")
     steps_a_round = args.num_envs * task.years
     num_rounds = args.total_timesteps // steps_a_round
-    if num_rounds < 2:
-        protocol.fail(f"--total-timesteps {args.total_timesteps}: at least {2 * steps_a_round}, two rounds")
-    screening_rounds = min(max(1, round(args.screening * num_rounds)), num_rounds - 1)
+    if not num_rounds:
+        protocol.fail(f"--total-timesteps {args.total_timesteps}: at least {steps_a_round}, a round, is allowed")
+    screening_rounds = max(1, round(args.screening * num_rounds))
     update_columns = ("round", "global_step", "sites", "plans", "explained_variance")
 
     with protocol.Run(args, task, __file__, episodes=task.episode_columns, updates=update_columns) as run:
