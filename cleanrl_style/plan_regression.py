@@ -31,7 +31,7 @@ class Args:
 
     # Algorithm
     screening: float = 0.2
-    """share of the steps in which all 21 plans are played, at least a round; then those that came closest to the best"""
+    """share of the steps in which all 21 plans are played, a round at least; then those closest to the best"""
     finalists: Literal[3, 4, 6, 7, 12, 21] = 6
     """how many are played on; divides the number of environments, 84"""
     ridge: float = 100.0
@@ -96,7 +96,8 @@ class Agent(nn.Module):
         What a site gives to all plans is taken off: it decides nothing, and is most of what varies.
         """
         self.mean.copy_(sites.mean(dim=0))
-        self.std.copy_(sites.std(dim=0, correction=0).clamp(min=1e-9))
+        std = sites.std(dim=0, correction=0)
+        self.std.copy_(torch.where(std > 1e-6, std, 1.0))  # what is the same on all sites says nothing
         features = self.features(sites)
         penalty = torch.full((features.shape[1],), ridge, dtype=torch.double)
         penalty[0] = 0.0  # a plan's own mean is not shrunk
