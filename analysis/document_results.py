@@ -39,7 +39,10 @@ PAGES = (
     "docs/results.md",
     "docs/scaling.md",
     "docs/outside.md",
-    *(f"docs/algorithms/{name}.md" for name in methods.scripts(methods.CONDITIONED, methods.FIXED_WEIGHT)),
+    *(
+        f"docs/algorithms/{name}.md"
+        for name in methods.scripts(methods.CONDITIONED, methods.BANDIT, methods.FIXED_WEIGHT)
+    ),
     "docs/algorithms/heuristics.md",
 )
 SECTION = re.compile(r"(<!-- results of ([\w-]+) -->\n).*?(<!-- end of results -->)", re.DOTALL)

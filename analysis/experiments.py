@@ -179,6 +179,15 @@ def planners(seeds) -> list[Job]:
     ]
 
 
+def bandit(seeds) -> list[Job]:
+    """A plan for each site by regression, on both tasks."""
+    return [
+        trained("bandit", "plan_regression", seed, **env)
+        for seed in seeds_of(5, seeds)
+        for env in ({}, {"env_id": BALANCED})
+    ]
+
+
 def other_worlds(seeds) -> list[Job]:
     """Group PPO with three and four objectives, and in a climate that warms."""
     return [
@@ -291,6 +300,7 @@ EXPERIMENTS = {
     "group": Experiment(group, "group PPO with one choice changed, such as the size of groups"),
     "outside": Experiment(outside, "algorithms of other libraries, on both tasks"),
     "planners": Experiment(planners, "NSGA-II and MOEA/D over a small policy, on both tasks"),
+    "bandit": Experiment(bandit, "a constant plan for each site, chosen by a regression, on both tasks"),
     "worlds": Experiment(other_worlds, "group PPO with three and four objectives, and in a climate that warms"),
     "fixed": Experiment(fixed_weights, "learning asymmetry: EUPG with a fixed weight, one run a weight and seed"),
     "site": Experiment(single_sites, "the same on single sites, one run a weight and site"),
@@ -313,6 +323,7 @@ def jobs(only=tuple(EXPERIMENTS), seeds: list[int] | None = None) -> list[Job]:
 QUICK_STEPS = 1600  # an episode of each of 32 stands
 QUICK_STEPS_ALONE = 400  # of scripts that step one stand
 QUICK_POPULATION = {"population": 8, "episodes_each": 2}  # of NSGA-II, whose generation is more than those steps
+QUICK_ROUND = {"total_timesteps": 4200}  # of plan regression, which plays 21 plans on four sites at least
 QUICK_EVALUATION = {"eval_episodes": 2, "eval_weights": (0.0, 0.5, 1.0)}
 
 
@@ -334,7 +345,7 @@ def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path | None = None) -> list[Jo
             alone = job.script.startswith("eupg") and "num_envs" not in flags
             steps = QUICK_STEPS_ALONE if alone else QUICK_STEPS
             flags["total_timesteps"] = steps * job.steps // DEFAULT_STEPS[job.mode]
-        flags |= QUICK_EVALUATION | (QUICK_POPULATION if job.script == "moea" else {})
+        flags |= QUICK_EVALUATION | {"moea": QUICK_POPULATION, "plan_regression": QUICK_ROUND}.get(job.script, {})
         if names := REGISTERED[job.env_id].get("objectives"):  # more than two: each alone
             flags["eval_weights"] = tuple(float(one == other) for one in names for other in names)
         if "preference" in flags:

@@ -21,9 +21,10 @@ from analysis.tables.common import score_text
 WORLDS = (BALANCED, GENERALIST)
 BEST_PLAN, DECIDUOUS = "best_constant_mix", "dense_deciduous"
 PLANTING = ("plus_100", "")
-LEARNED = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum", "ppo_group")
+GROUP = "ppo_group"
+LEARNED = ("eupg_var_lambda", "ppo_gated", "ppo_curriculum", GROUP, "plan_regression")
 """Rows of the README below the plans that look at nothing."""
-MORE_STEPS = (1_000_000, 3_000_000)
+MORE_STEPS = (1_000_000, 3_000_000)  # of Group PPO
 SPLITS = 1000  # of the test sites into random halves
 NOT_RUN = "Not run yet: `python analysis/reproduce.py --only main balanced`.\n"
 
@@ -50,7 +51,7 @@ def shown(scores: dict) -> str:
 
 
 def short_table(results) -> str:
-    """Scores of two plans that look at nothing and of four trained methods, in both worlds; the best with more steps.
+    """Scores of two plans that look at nothing and of trained methods, in both worlds; Group PPO with more steps, too.
 
     That of a single training is not shown: another seed's may be far from it.
     """
@@ -67,23 +68,25 @@ def short_table(results) -> str:
         seeds = " and ".join(dict.fromkeys(str(len(replicates)) for replicates in of_worlds if replicates))
         cells = [shown(main_results.scores(one)) if len(one) > 1 else "" for one in of_worlds]
         text += f"| {methods.title(script)} | {seeds or 'not run yet'} | {' | '.join(cells)} |\n"
-    return text + "".join(of_more_steps(results, steps) for steps in MORE_STEPS)
+        if script == GROUP:
+            text += "".join(of_more_steps(results, steps) for steps in MORE_STEPS)
+    return text
 
 
 def of_more_steps(results, steps: int) -> str:
-    """The row of the best method with so many steps; none until both worlds have several seeds."""
+    """Group PPO's row with so many steps; none until both worlds have several seeds."""
     of_worlds = [with_more_steps(results, env_id, steps) for env_id in WORLDS]
     if min(map(len, of_worlds)) < 2:
         return ""
     values = " | ".join(shown(main_results.scores(replicates)) for replicates in of_worlds)
     seeds = " and ".join(dict.fromkeys(str(len(replicates)) for replicates in of_worlds))
-    return f"| {methods.title(LEARNED[-1])}, {steps:,} steps | {seeds} | {values} |\n"
+    return f"| {methods.title(GROUP)}, {steps:,} steps | {seeds} | {values} |\n"
 
 
 def with_more_steps(results, env_id: str, steps: int) -> list:
-    """The runs of the best method with so many steps in a world."""
+    """Group PPO's runs with so many steps in a world."""
     setting = f"total_timesteps={steps}, vectorization=lockstep"
-    return results.rows_of_two_objectives().get((LEARNED[-1], env_id, setting), [])
+    return results.rows_of_two_objectives().get((GROUP, env_id, setting), [])
 
 
 def on_sites(replicates: list) -> pd.DataFrame:
@@ -233,7 +236,7 @@ def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plan
 
 
 def of_longer_trainings(results, env_id: str, best_plans: list) -> str:
-    """What the best method scores with `MORE_STEPS`, and whether that is told from 100; empty without such runs."""
+    """What Group PPO scores with `MORE_STEPS`, and whether that is told from 100; empty without such runs."""
     longer = {steps: with_more_steps(results, env_id, steps) for steps in MORE_STEPS}
     longer = {steps: replicates for steps, replicates in longer.items() if len(replicates) > 1}
     text = ""
@@ -242,7 +245,7 @@ def of_longer_trainings(results, env_id: str, best_plans: list) -> str:
         side = {1: "above 100", 0: "not told apart from 100", -1: "below 100"}[
             beside_100(*ends_of_score(its, replicates, best_plans))
         ]
-        text += f" With {steps:,} steps and {of_seeds(replicates)} {methods.title(LEARNED[-1])} scores {shown(its)}, "
+        text += f" With {steps:,} steps and {of_seeds(replicates)} {methods.title(GROUP)} scores {shown(its)}, "
         text += f"{side}."
     if longer:
         more = listed([points(replicates, best_plans, best_plans) for replicates in longer.values()])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 CONDITIONED = "conditioned on the preference"
 FIXED_WEIGHT = "trained for one weight"
 POPULATION = "a population, one of which is chosen for each weight"
+BANDIT = "a plan is chosen for each site and weight"
 HEURISTIC = "fixed strategy of the paper"
 CONTROL = "fixed strategy of ours"
 OTHERS = "of another library"
@@ -25,7 +26,7 @@ class Method:
     @property
     def trains(self) -> bool:
         """Whether it is trained."""
-        return self.kind in (CONDITIONED, FIXED_WEIGHT, POPULATION, OTHERS)
+        return self.kind in (CONDITIONED, FIXED_WEIGHT, POPULATION, BANDIT, OTHERS)
 
     @property
     def path(self) -> str:
@@ -45,6 +46,7 @@ ROWS = (
     Method("ppo_gated", "PPO Gated", CONDITIONED, "#009E73", "^", "ppo_gated"),
     Method("ppo_curriculum", "Curriculum PPO", CONDITIONED, "#D55E00", "o", "curriculum_ppo"),
     Method("ppo_group", "Group PPO", CONDITIONED, "#0072B2", "P"),
+    Method("plan_regression", "Plan regression", BANDIT, "#117733", "<"),
     Method("eupg_fixed_lambda", "Fixed λ EUPG", FIXED_WEIGHT, "#882255", "D", "fixed_weight_eupg"),
     Method("pcn", "PCN", OTHERS, "#E69F00", "p"),
     Method("gpi_ls", "GPI-LS", OTHERS, "#56B4E9", "h"),
@@ -64,7 +66,7 @@ def scripts(*kinds: str) -> tuple[str, ...]:
 
 
 LEARNERS = scripts(CONDITIONED)
-TRAINED = scripts(CONDITIONED, FIXED_WEIGHT, OTHERS, POPULATION)
+TRAINED = scripts(CONDITIONED, BANDIT, FIXED_WEIGHT, OTHERS, POPULATION)
 STRATEGIES = scripts(HEURISTIC, CONTROL)
 OUTSIDE = scripts(OTHERS)
 

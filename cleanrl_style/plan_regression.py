@@ -52,7 +52,7 @@ class Args:
     """project of Weights & Biases"""
 
     num_envs = 84  # no flag: four groups of 21 plans, then as many as there are of the finalists
-    limits = {"screening": (0.0, 1.0), "ridge": (0.0, 1e9)}
+    limits = {"screening": (0, 1), "ridge": (0, 10**9)}
 
 
 if __name__ == "__main__":
@@ -95,9 +95,10 @@ class Agent(nn.Module):
 
         What a site gives to all plans is taken off: it decides nothing, and is most of what varies.
         """
-        self.mean.copy_(sites.mean(dim=0))
-        std = sites.std(dim=0, correction=0)
-        self.std.copy_(torch.where(std > 1e-6, std, 1.0))  # what is the same on all sites says nothing
+        if self.inputs:
+            std = sites.std(dim=0, correction=0)
+            self.mean.copy_(sites.mean(dim=0))
+            self.std.copy_(torch.where(std > 1e-6, std, 1.0))  # what is the same on all sites says nothing
         features = self.features(sites)
         penalty = torch.full((features.shape[1],), ridge, dtype=torch.double)
         penalty[0] = 0.0  # a plan's own mean is not shrunk
