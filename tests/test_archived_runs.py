@@ -19,8 +19,8 @@ BALANCED = ("--env-id", "boreal-balanced-v0")
     ("folder", "flags"),
     [
         ("ppo_group/boreal-generalist-v0-vectorization=lockstep", ()),
-        ("ppo_gated/boreal-generalist-v0-vectorization=lockstep", ()),
         ("ppo_curriculum/boreal-balanced-v0-vectorization=lockstep", BALANCED),
+        ("plan_regression/boreal-balanced-v0-vectorization=lockstep", BALANCED),
     ],
 )
 def test_the_first_updates_of_an_archived_run_repeat(folder, flags, tmp_path, monkeypatch):
