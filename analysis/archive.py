@@ -18,7 +18,7 @@ from cleanrl_style import protocol
 from cleanrl_style.protocol.run_folder import folder_name
 
 POLICY = "policy.pt"
-MAIN = ("main", "balanced")
+MAIN = ("main", "balanced", "bandit")
 
 
 @dataclass
