@@ -1,4 +1,4 @@
-"""Every experiment: the main table on both tasks, what the best method owes to what, other libraries, then the paper's.
+"""Every experiment: the main table on both tasks, what Group PPO owes to what, other libraries, then the paper's.
 
 In this order, so that what is not run, if anything, is the end.
 """
