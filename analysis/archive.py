@@ -3,7 +3,8 @@
     python analysis/archive.py [--runs-dir runs] [--archive-dir results/runs]
 
 A run's folder there has its config.json as it is, tables.zip with the tables that `analysis/reduction.py` names, and,
-of the runs of the main table, on either task, policy.pt: the agent, which `cleanrl_style.protocol.load_policy` loads.
+of the runs of the main table, on either task, and of plan regression, policy.pt: the agent, which
+`cleanrl_style.protocol.load_policy` loads.
 """
 
 import io
@@ -18,7 +19,7 @@ from cleanrl_style import protocol
 from cleanrl_style.protocol.run_folder import folder_name
 
 POLICY = "policy.pt"
-MAIN = ("main", "balanced", "bandit")
+WITH_POLICY = ("main", "balanced", "bandit")
 
 
 @dataclass
@@ -50,9 +51,9 @@ def folder_of(config: dict, archive_dir: Path) -> Path:
 
 
 def archive_run(run: runs.Run, archive_dir: Path, jobs: list[experiments.Job]) -> bool:
-    """Archive a run, its policy if a job of the main table made it; False if the archive has the same bytes."""
+    """Archive a run, its policy if a job of `WITH_POLICY` made it; False if the archive has the same bytes."""
     folder, policy = folder_of(run.config, archive_dir), run.folder / POLICY
-    keeps_policy = policy.exists() and any(job.experiment in MAIN and job.made(run.config) for job in jobs)
+    keeps_policy = policy.exists() and any(job.experiment in WITH_POLICY and job.made(run.config) for job in jobs)
     kept = {"config.json": (run.folder / "config.json").read_bytes()}
     kept |= {POLICY: policy.read_bytes()} if keeps_policy else {}
     kept[runs.ARCHIVED] = tables_of(run)  # last: it declares the run finished

@@ -84,6 +84,7 @@ class Agent(nn.Module):
         self.register_buffer("slopes", torch.zeros(1 + len(inputs), len(plans), num_objectives, dtype=torch.double))
 
     def features(self, sites):
+        """1 and the scaled inputs, (n, 1 + inputs), of sites (n, inputs)."""
         return torch.cat([torch.ones((len(sites), 1), dtype=torch.double), (sites - self.mean) / self.std], dim=1)
 
     def predict(self, sites):

@@ -106,7 +106,7 @@ def test_commands_say_what_their_jobs_mean(monkeypatch):
 def test_quick_has_every_kind_of_job():
     quick, full = experiments.quick_jobs(), experiments.jobs()
     assert {(job.experiment, job.script) for job in quick} == {(job.experiment, job.script) for job in full}
-    assert all(job.steps <= 4200 for job in quick)
+    assert all(job.steps <= experiments.QUICK_ROUND["total_timesteps"] for job in quick)
     assert len({job.command for job in quick}) == len(quick)
     # a folder is of the same run, whatever is asked for
     alone = [job for name in COUNTS for job in experiments.quick_jobs((name,))]
