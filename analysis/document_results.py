@@ -345,7 +345,8 @@ def other_libraries(results: Results) -> str:
 SPLITS = {
     "validation": "variants and budgets are chosen on them; no training learns from them",
     "test": "results are of them; choices made knowing them: the constant plans (decision 65), no relabelling "
-    "(decision 109), ten seeds for a million steps (decision 111), five for three million (decision 112)",
+    "(decision 109), ten seeds for a million steps (decision 111), five for three million (decision 112), "
+    "plan regression as a method (decision 115)",
 }
 
 

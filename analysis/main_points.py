@@ -95,15 +95,14 @@ def on_sites(replicates: list) -> pd.DataFrame:
 
 
 def ends_of_difference(replicates: list, other: list) -> tuple[float, float]:
-    """Ends of both 95 % intervals of what one gains more: over seeds and sites, and by t over seeds.
+    """Ends of both 95 % intervals of what one gains more: over seeds and sites, and by Welch's t over seeds.
 
     Of a plan or a single training, which has no seeds to differ, the other's seeds alone count.
     """
     first, second = on_sites(replicates), on_sites(other)
     _, low, high = metrics.difference_interval(first, second)
-    (ours, our_half), (theirs, their_half) = (metrics.mean_interval(rows.mean(axis=1)) for rows in (first, second))
-    half = np.hypot(our_half, np.nan_to_num(their_half))
-    return metrics.both_ends(low, high, ours - theirs, half)
+    t_low, t_high = metrics.welch_interval(first.mean(axis=1), second.mean(axis=1))
+    return min(low, t_low), max(high, t_high)
 
 
 def is_above(replicates: list, other: list) -> bool:

@@ -64,6 +64,24 @@ def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values.mean(axis=0), scipy.stats.t.ppf(0.975, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
 
 
+def welch_interval(first, second) -> tuple[float, float]:
+    """Ends of the 95 % interval of one mean less another, by Welch's t; NaN of two single values.
+
+    Of a single value, which has no spread, the other side's counts alone.
+    """
+    sides = [np.asarray(values, dtype=float) for values in (first, second)]
+    difference = sides[0].mean() - sides[1].mean()
+    variances = [(side.var(ddof=1) / len(side), len(side)) for side in sides if len(side) > 1]
+    if not variances:
+        return np.nan, np.nan
+    variance = sum(one for one, _ in variances)
+    if variance == 0.0:
+        return difference, difference
+    freedom = variance**2 / sum(one**2 / (n - 1) for one, n in variances)
+    half_width = scipy.stats.t.ppf(0.975, freedom) * np.sqrt(variance)
+    return float(difference - half_width), float(difference + half_width)
+
+
 def both_ends(low: float, high: float, mean: float, half_width: float) -> tuple[float, float]:
     """Ends of two 95 % intervals together, a bootstrap's and t's: what is told is told by both."""
     return min(low, mean - half_width), max(high, mean + half_width)

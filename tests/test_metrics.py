@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.stats
 
 from analysis import metrics
 from analysis.tables.common import PAPER_TABLES
@@ -253,6 +254,17 @@ def test_the_best_plan_is_chosen_anew_on_every_drawn_set_of_sites():
     plans = np.stack([half, 1 - half])[:, None, :]
     value, low, high = metrics.score_interval(np.full((4, 100), 0.5), plans)
     assert value == pytest.approx(100) and high < 100 + 1e-9 and low == pytest.approx(100 / (1 + 2 * 0.112), abs=1)
+
+
+def test_welch_interval_by_hand():
+    # means 2 and 4, variances of the means 1/3 and 4/3, so (5/3)^2 / ((1/9 + 16/9) / 2) = 50/17 degrees of freedom
+    half_width = scipy.stats.t.ppf(0.975, 50 / 17) * (5 / 3) ** 0.5
+    low, high = metrics.welch_interval([1, 2, 3], [2, 4, 6])
+    assert (low, high) == pytest.approx((-2 - half_width, -2 + half_width))
+    # a single value has no spread of its own
+    mean, half_width = metrics.mean_interval([1, 2, 3])
+    assert metrics.welch_interval([1, 2, 3], [5]) == pytest.approx((mean - 5 - half_width, mean - 5 + half_width))
+    assert metrics.welch_interval([1, 1], [3, 3, 3]) == (-2, -2)
 
 
 def test_a_difference_has_an_interval_of_four_standard_errors():

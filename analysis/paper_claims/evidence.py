@@ -56,9 +56,9 @@ def unpaired(first: pd.Series, second: pd.Series) -> Number:
         for one in (first, second)
     ]
     low, high = np.percentile(drawn[0] - drawn[1], [2.5, 97.5])
-    t = stats.ttest_ind(first, second, equal_var=False).confidence_interval()
     value = metrics.iqm(first.to_numpy()) - metrics.iqm(second.to_numpy())
-    return Number(value, low, high, SEEDS, min(len(first), len(second)), t.low, t.high)
+    t_low, t_high = metrics.welch_interval(first, second)
+    return Number(value, low, high, SEEDS, min(len(first), len(second)), t_low, t_high)
 
 
 def mean_of(values, over: str) -> Number:
