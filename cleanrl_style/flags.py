@@ -205,7 +205,7 @@ def check_limits(args) -> None:
         for number in flat(value):
             if not low <= number <= high:
                 fail(f"--{name.replace('_', '-')} must lie in [{low}, {high}], not {number}")
-    if not hasattr(args, "num_envs"):
+    if "num_envs" not in vars(args):  # it is no flag there
         return
     fill_in_envs(args)
     if args.num_envs % getattr(args, "group_size", 1):

@@ -264,7 +264,7 @@ if __name__ == "__main__":
         progress = run.progress(num_generations * steps_a_generation, global_step)
 
         for generation in range(first_generation, num_generations + 1):
-            start = time.perf_counter()
+            rollout_start, env_seconds = time.perf_counter(), 0.0
             asked = algorithm.ask()
             if asked is None:  # all plans there are have been tried
                 break
@@ -279,16 +279,20 @@ if __name__ == "__main__":
             for _ in range(task.years):
                 global_step += args.num_envs
                 actions = agent.get_action(next_obs, task.action_masks(envs, next_obs), of_stand)
+                env_start = time.perf_counter()
                 next_obs, rewards, _, _, infos = envs.step(actions)
+                env_seconds += time.perf_counter() - env_start
                 returns += rewards
                 progress.show(global_step)
-            run.time("environment", global_step, time.perf_counter() - start)
             for i in range(len(genes) * episodes_each):
                 episode += 1
                 row = {"global_step": global_step, "episode": episode, "env": i}
                 row |= task.returns_row(preferences[i], returns[i]) | protocol.final_info(infos, i)
                 run.log("episodes", row)
                 progress.returns.append(returns[i])
+            run.time("environment", global_step, env_seconds)
+            run.time("rollout", global_step, time.perf_counter() - rollout_start)
+            update_start = time.perf_counter()
 
             means = returns.reshape(args.population, episodes_each, -1).mean(axis=1)
             zero_change = means[0] if zero_change is None else zero_change  # the very first candidate does nothing
@@ -306,6 +310,7 @@ if __name__ == "__main__":
                 "mean_best_gain": (lattice @ best[1].T).max(axis=1).mean(),
             }
             run.log("updates", row)
+            run.time("update", global_step, time.perf_counter() - update_start)
             last = generation == num_generations
             run.save(global_step, last=last, told=told, zero_change=zero_change, episode=episode)
 

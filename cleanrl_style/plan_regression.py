@@ -35,7 +35,7 @@ class Args:
     finalists: Literal[3, 4, 6, 7, 12, 21] = 6
     """how many are played on; divides the number of environments, 84"""
     ridge: float = 100.0
-    """penalty of the slopes, of parameters with mean 0 and deviation 1: weighs as much as so many sites"""
+    """penalty of the slopes, of parameters with mean 0 and deviation 1: weighs as much as so many sites; not 0"""
 
     # Evaluation and output
     eval_episodes: int = 200
@@ -52,7 +52,7 @@ class Args:
     """project of Weights & Biases"""
 
     num_envs = 84  # no flag: four groups of 21 plans, then as many as there are of the finalists
-    limits = {"screening": (0, 1), "ridge": (0, 10**9)}
+    limits = {"screening": (0, 1), "ridge": (0.001, 10**9)}
 
 
 if __name__ == "__main__":
@@ -127,23 +127,33 @@ def closest_to_the_best(returns, weights, number):
     """Which plans to play on, `number` of them in ascending order: by how near each comes to the best of any weight.
 
     returns (n, plans, m) on n sites, weights (k, m). The shortfall at a weight is in deviations that returns have
-    between the plans, so that each weight counts alike; what counts of a plan is its smallest.
+    between the plans, so that each weight counts alike; what counts of a plan is its smallest. Of more best plans than
+    `number`, those that are best for most weights are kept.
     """
     scalarised = protocol.scalarize(returns.mean(dim=0), weights[:, None])
     shortfall = scalarised.max(dim=1, keepdim=True).values - scalarised
     shortfall /= scalarised.std(dim=1, keepdim=True) + 1e-9
-    return shortfall.min(dim=0).values.argsort(stable=True)[:number].sort().values
+    weights_won = (shortfall == 0).sum(dim=0)
+    order = np.lexsort((-weights_won.numpy(), shortfall.min(dim=0).values.numpy()))
+    return torch.from_numpy(order[:number]).sort().values
 
 
 if __name__ == "__main__":
     task = protocol.make_task(args, hide_site=args.hide_site)
     if not task.boreal:
         protocol.fail(f"--env-id {args.env_id}: the plans are of the boreal environments alone")
+    if task.mode == "generalist" and not task.site_entries and not args.hide_site:
+        protocol.fail(f"--env-id {args.env_id}: it observes no site parameters by name; --hide-site is allowed")
     steps_a_round = args.num_envs * task.years
     num_rounds = args.total_timesteps // steps_a_round
     if not num_rounds:
         protocol.fail(f"--total-timesteps {args.total_timesteps}: at least {steps_a_round}, a round, is allowed")
     screening_rounds = max(1, round(args.screening * num_rounds))
+    print(f"{num_rounds} rounds: {num_rounds * steps_a_round:,} of {args.total_timesteps:,} steps", end="; ")
+    if screening_rounds < num_rounds:
+        print(f"from round {screening_rounds + 1} on {args.finalists} of {len(PLANS)} plans", flush=True)
+    else:
+        print(f"all {len(PLANS)} plans in each, as none is left for --finalists", flush=True)
     update_columns = ("round", "global_step", "sites", "plans", "explained_variance")
 
     with protocol.Run(args, task, __file__, episodes=task.episode_columns, updates=update_columns) as run:
@@ -176,7 +186,7 @@ if __name__ == "__main__":
         progress = run.progress(num_rounds * steps_a_round, global_step)
 
         for number in range(first_round, num_rounds + 1):
-            start = time.perf_counter()
+            rollout_start, env_seconds = time.perf_counter(), 0.0
             if number == screening_rounds + 1:
                 kept = closest_to_the_best(seen_returns, lattice, args.finalists)
                 plans, seen_returns = plans[kept], seen_returns[:, kept]
@@ -191,17 +201,21 @@ if __name__ == "__main__":
             for _ in range(task.years):
                 global_step += args.num_envs
                 actions = where_valid(of_stand, task.action_masks(envs, next_obs))
+                env_start = time.perf_counter()
                 # SAME_STEP autoreset: after an end next_obs is already the next episode's first
                 next_obs, rewards, _, _, infos = envs.step(actions)
+                env_seconds += time.perf_counter() - env_start
                 returns += rewards
                 progress.show(global_step)
-            run.time("environment", global_step, time.perf_counter() - start)
             for i in range(args.num_envs):
                 episode += 1
                 row = {"global_step": global_step, "episode": episode, "env": i}
                 row |= task.returns_row(preferences[i], returns[i]) | protocol.final_info(infos, i)
                 run.log("episodes", row)
                 progress.returns.append(returns[i])
+            run.time("environment", global_step, env_seconds)
+            run.time("rollout", global_step, time.perf_counter() - rollout_start)
+            update_start = time.perf_counter()
 
             # how well the plans' differences are predicted on sites that were not fitted
             returns = torch.from_numpy(returns).unflatten(0, (-1, len(plans)))
@@ -218,6 +232,7 @@ if __name__ == "__main__":
             agent = Agent(envs, plans.tolist(), **shape)
             agent.fit(seen_sites, seen_returns, args.ridge)
             run.log("updates", row | {"sites": len(seen_sites)})
+            run.time("update", global_step, time.perf_counter() - update_start)
 
             last = number == num_rounds
             run.validate(global_step, last, make_policy(agent))

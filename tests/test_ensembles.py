@@ -28,6 +28,12 @@ def test_what_most_are_sure_of_is_chosen_and_nothing_invalid():
     np.testing.assert_allclose(ensembles.together(alike[:2])(None, masks, None), alike[0](None, masks, None))
 
 
+def test_too_few_policies_are_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(paths, "archive", lambda: tmp_path)
+    with pytest.raises(SystemExit, match="ppo_group: two policies and more of boreal-.*-v0 are needed"):
+        ensembles.main(ensembles.Args())
+
+
 @pytest.mark.slow
 def test_the_archived_policies_play_together_and_not_twice(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(paths, "studies", lambda quick: tmp_path)

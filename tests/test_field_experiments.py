@@ -89,3 +89,5 @@ def test_unknown_constants_are_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit, match="--names nothing: a name in sim/constants.csv is allowed"):
         run_script("analysis/studies/planting_signs.py", "--names", "nothing")
+    with pytest.raises(SystemExit, match="--sites 500: 1 to 400 are allowed"):
+        run_script("analysis/studies/planting_signs.py", "--sites", 500)

@@ -2,6 +2,7 @@
 
 import json
 
+import gymnasium as gym
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,6 +12,8 @@ from scripts import run_script
 from cleanrl_style import protocol
 from cleanrl_style.plan_regression import PLANS, Agent, closest_to_the_best, make_policy
 from cleanrl_style.protocol import run_folder
+
+gym.register("blind-v0", entry_point="boreal_env:BorealEnv", kwargs={"observation_groups": ("preference", "climate")})
 
 SCRIPT = "cleanrl_style/plan_regression.py"
 QUICK = "quick_env:quick-v0"
@@ -86,6 +89,17 @@ def test_the_best_of_each_weight_stay():
     assert closest_to_the_best(returns, weights, 4).tolist() == [1, 2, 3, 4]
 
 
+def test_of_more_best_plans_than_places_those_that_are_best_most_often_stay():
+    angles = np.linspace(0, np.pi / 2, 4)  # four corners of a round front, the first the best of one weight alone
+    returns = torch.tensor(np.stack([np.cos(angles), np.sin(angles)], axis=1)[None])
+    share = torch.tensor([1.0, 0.7, 0.6, 0.4, 0.35, 0.3, 0.1, 0.0], dtype=torch.double)
+    weights = torch.stack([share, 1 - share], dim=1)
+    won = np.bincount((returns[0] @ weights.T).argmax(dim=0), minlength=4)
+    assert won.tolist() == [1, 2, 3, 2]
+    assert closest_to_the_best(returns, weights, 3).tolist() == [1, 2, 3]
+    assert closest_to_the_best(returns, weights, 1).tolist() == [2]
+
+
 def test_the_plans_are_all_that_do_the_same_every_year():
     # the five actions that change no density are one
     assert sorted(PLANS) == [action for action in range(25) if not 10 <= action < 15 or action == 12]
@@ -101,7 +115,9 @@ def train(folder, *more, env_id=QUICK):
     run_script(SCRIPT, *given, "--eval-episodes", 2, "--eval-weights", *weights, "--run-dir", folder, *more)
 
 
-@pytest.mark.parametrize("env_id, more", [(QUICK, ()), ("timber_env:timber-v0", ("--finalists", 3))])
+@pytest.mark.parametrize(
+    "env_id, more", [(QUICK, ("--vectorization", "async")), ("timber_env:timber-v0", ("--finalists", 3))]
+)
 def test_a_training_leaves_a_run_and_goes_on_to_the_same_bytes(env_id, more, tmp_path, monkeypatch):
     monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 1)
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
@@ -123,7 +139,7 @@ def test_a_training_leaves_a_run_and_goes_on_to_the_same_bytes(env_id, more, tmp
         assert (whole / name).read_bytes() == (stopped / name).read_bytes(), name
 
     updates, episodes = pd.read_csv(whole / "updates.csv"), pd.read_csv(whole / "episodes.csv")
-    finalists = int(more[1]) if more else 6
+    finalists = 3 if "--finalists" in more else 6
     assert updates.plans.tolist() == [21, finalists, finalists]
     assert updates.sites.tolist() == [4, 4 + 84 // finalists, 4 + 2 * 84 // finalists]
     assert len(episodes) == 3 * 84 and episodes.site_seed.nunique() == updates.sites.iloc[-1]
@@ -153,8 +169,10 @@ def test_async_gives_the_same_episodes(tmp_path):
     [
         (("--total-timesteps", 335), "--total-timesteps 335: at least 336, a round, is allowed"),
         (("--screening", 1.5), r"--screening must lie in \[0, 1\], not 1.5"),
-        (("--ridge", -1), r"--ridge must lie in \[0, 1000000000\], not -1"),
+        (("--ridge", 0), r"--ridge must lie in \[0.001, 1000000000\], not 0"),
         (("--finalists", 5), "--finalists.* 5"),
+        (("--total-timesteps", 50), "--total-timesteps 50: at least 336, a round, is allowed"),
+        (("--env-id", "blind-v0"), "--env-id blind-v0: it observes no site parameters by name; --hide-site is allowed"),
         (("--env-id", "toy_env:toy-lockstep-v0"), "the plans are of the boreal environments alone"),
     ],
 )
@@ -162,3 +180,15 @@ def test_what_cannot_be_learned_is_refused(arguments, message, tmp_path):
     with pytest.raises(SystemExit, match=message):
         train(tmp_path / "run", *arguments)
     assert not (tmp_path / "run").exists()
+
+
+def test_the_rounds_are_said(tmp_path, capsys):
+    given = ("--total-timesteps", 700, "--eval-episodes", 1)
+    train(tmp_path / "some", *given)
+    assert "2 rounds: 672 of 700 steps; from round 2 on 6 of 21 plans\n" in capsys.readouterr().out
+    train(tmp_path / "none", *given, "--screening", 1)
+    assert "2 rounds: 672 of 700 steps; all 21 plans in each, as none is left for --finalists\n" in (
+        capsys.readouterr().out
+    )
+    phases = pd.read_csv(tmp_path / "some" / "timing.csv").set_index("phase").seconds
+    assert 0 < phases["environment"].sum() < phases["rollout"].sum() and phases["update"].sum() > 0

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis import paths
+from analysis import paths, stored
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts, reference
 from cleanrl_style.protocol.arguments import ideal_point
@@ -102,9 +102,8 @@ def main(args: Args) -> None:
     front, choices = study(task, protocol.evaluation_seeds(task, 1))
     print(front.to_string(index=False, float_format="%.3f"))
     path = paths.studies() / "concave_front.csv"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with protocol.replacing(path) as file:
-        front.to_csv(file, index=False, float_format="%.6g", lineterminator="\n")
+    made_by = {"env_id": args.env_id, "site_seed": args.site_seed, "physics": reference.physics_name()}
+    stored.write(path, front, made_by)
     with protocol.replacing(args.path) as file:
         title = f"{args.env_id}, site {args.site_seed}: constant plans"
         draw(front, choices, title).savefig(file, format="png", dpi=110)

@@ -104,6 +104,8 @@ def main(args: Args) -> None:
     if args.quick:
         args.sites, args.years = 2, 2
         everything = [v for v in everything if v is DEFAULT or v.factor.startswith("snow_viscosity")]
+    if not 1 <= args.sites <= open_loop.CANDIDATES:
+        protocol.fail(f"--sites {args.sites}: 1 to {open_loop.CANDIDATES} are allowed")
     if args.names:
         unknown = [name for name in args.names if name not in sim.CONSTANTS]
         if unknown:
