@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from resumed import assert_goes_on_to_the_same_bytes
 from scripts import run_script
 
 import boreal_env
@@ -150,22 +151,8 @@ def search(folder, *more, env_id=QUICK, vectorization="lockstep"):
 def test_a_search_leaves_a_run_and_goes_on_to_the_same_bytes(env_id, vectorization, more, tmp_path, monkeypatch):
     pytest.importorskip("pymoo")
     monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 1)
-    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
-    search(whole, *more, env_id=env_id)
-
-    save = protocol.Run.save
-
-    def save_once(run, global_step, last, **state):
-        save(run, global_step, last, **state)
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as once, pytest.raises(SystemExit):
-        once.setattr(protocol.Run, "save", save_once)
-        search(stopped, *more, env_id=env_id)
-    assert not (stopped / "evaluation.csv").exists()
-    search(stopped, *more, env_id=env_id)
-    for name in ("episodes.csv", "updates.csv", "evaluation.csv", "policy.pt", "summary.png"):
-        assert (whole / name).read_bytes() == (stopped / name).read_bytes(), name
+    whole = tmp_path / "whole"
+    assert_goes_on_to_the_same_bytes(lambda folder: search(folder, *more, env_id=env_id), tmp_path)
     if vectorization == "async":
         search(tmp_path / "async", *more, env_id=env_id, vectorization=vectorization)
         for name in ("episodes.csv", "evaluation.csv"):

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from resumed import assert_goes_on_to_the_same_bytes
 from scripts import run_script
 
 from cleanrl_style import protocol
@@ -120,23 +121,8 @@ def train(folder, *more, env_id=QUICK):
 )
 def test_a_training_leaves_a_run_and_goes_on_to_the_same_bytes(env_id, more, tmp_path, monkeypatch):
     monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 1)
-    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
-    train(whole, *more, env_id=env_id)
-    save = protocol.Run.save
-
-    for _ in range(2):  # stopped once before the finals, once in them
-
-        def save_once(run, global_step, last, **state):
-            save(run, global_step, last, **state)
-            raise KeyboardInterrupt
-
-        with monkeypatch.context() as once, pytest.raises(SystemExit):
-            once.setattr(protocol.Run, "save", save_once)
-            train(stopped, *more, env_id=env_id)
-    assert not (stopped / "evaluation.csv").exists()
-    train(stopped, *more, env_id=env_id)
-    for name in ("episodes.csv", "updates.csv", "evaluation.csv", "policy.pt", "summary.png"):
-        assert (whole / name).read_bytes() == (stopped / name).read_bytes(), name
+    whole = tmp_path / "whole"  # stopped once before the finals, once in them
+    assert_goes_on_to_the_same_bytes(lambda folder: train(folder, *more, env_id=env_id), tmp_path, stops=2)
 
     updates, episodes = pd.read_csv(whole / "updates.csv"), pd.read_csv(whole / "episodes.csv")
     finalists = 3 if "--finalists" in more else 6

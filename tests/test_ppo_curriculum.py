@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from resumed import assert_goes_on_to_the_same_bytes
 from scripts import ROOT, run_script
 from toy_env import optimal_return
 
@@ -305,21 +306,9 @@ def test_threshold_path_follows_from_the_episodes(finished_run):
 def test_a_coins_run_resumes_to_the_same_bytes(tmp_path, monkeypatch):
     monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 256)
     arguments = ("--selector", "coin", "--update-epochs", 1)
-    train(tmp_path / "whole", *arguments, env_id="resumable_toy:resumable-toy-v0")
-
-    def interrupt(run, *args, **kwargs):
-        save(run, *args, **kwargs)
-        raise KeyboardInterrupt
-
-    save = run_folder.Run.save
-    with monkeypatch.context() as patch, pytest.raises(SystemExit, match="130"):
-        patch.setattr(run_folder.Run, "save", interrupt)
-        train(tmp_path / "parts", *arguments, env_id="resumable_toy:resumable-toy-v0")
-    assert not (tmp_path / "parts" / "evaluation.csv").exists()
-    train(tmp_path / "parts", *arguments, env_id="resumable_toy:resumable-toy-v0")
-    for path in (tmp_path / "whole").iterdir():
-        if path.name != "timing.csv":
-            assert path.read_bytes() == (tmp_path / "parts" / path.name).read_bytes(), path.name
+    assert_goes_on_to_the_same_bytes(
+        lambda folder: train(folder, *arguments, env_id="resumable_toy:resumable-toy-v0"), tmp_path
+    )
     episodes = pd.read_csv(tmp_path / "whole" / "episodes.csv")
     assert episodes.score.nunique() == len(episodes) == 64 and 0.3 < episodes.selected.mean() < 0.7
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from resumed import assert_goes_on_to_the_same_bytes, assert_same_bytes
 from scripts import ROOT, run_script
 from toy_env import optimal_return
 
@@ -24,13 +25,6 @@ def train(folder, *arguments, env_id=TOY, steps=160):
     run_script(
         SCRIPT, "--env-id", env_id, "--run-dir", folder, "--total-timesteps", steps, *given, *evaluation, *arguments
     )
-
-
-def assert_same_bytes(folder, other, but=("timing.csv",)):
-    assert {path.name for path in folder.iterdir()} == {path.name for path in other.iterdir()}
-    for path in folder.iterdir():
-        if path.name not in but:
-            assert path.read_bytes() == (other / path.name).read_bytes(), path.name
 
 
 # -------------------------------------------------------------------------------------------------- the idea
@@ -170,19 +164,7 @@ def test_groups_share_site_start_and_weather_async_as_in_lockstep(tmp_path):
 def test_killed_and_resumed_is_as_never_killed(arguments, tmp_path, monkeypatch):
     """Also without groups where rollouts cut episodes."""
     monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 64)
-    train(tmp_path / "whole", *arguments)
-
-    def interrupt(run, *args, **kwargs):
-        save(run, *args, **kwargs)
-        raise KeyboardInterrupt
-
-    save = run_folder.Run.save
-    with monkeypatch.context() as patch, pytest.raises(SystemExit, match="130"):
-        patch.setattr(run_folder.Run, "save", interrupt)
-        train(tmp_path / "parts", *arguments)
-    assert not (tmp_path / "parts" / "evaluation.csv").exists()
-    train(tmp_path / "parts", *arguments)
-    assert_same_bytes(tmp_path / "whole", tmp_path / "parts")
+    assert_goes_on_to_the_same_bytes(lambda folder: train(folder, *arguments), tmp_path)
 
 
 @pytest.mark.parametrize(

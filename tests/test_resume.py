@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from resumed import assert_same_bytes
 from scripts import ROOT, run_script
 
 from cleanrl_style.protocol import training_envs
@@ -82,14 +83,6 @@ def wait_for_rows(process, folder, rows, table="updates.csv"):
             return
         time.sleep(0.005)
     pytest.fail(f"ended before its {rows} rows: {process.communicate()}")
-
-
-def assert_same_bytes(folder, other):
-    """Every file but timing.csv."""
-    names = {path.name for path in folder.iterdir()}
-    assert names == {path.name for path in other.iterdir()}
-    for name in names - {"timing.csv"}:
-        assert (folder / name).read_bytes() == (other / name).read_bytes(), name
 
 
 @pytest.mark.parametrize(

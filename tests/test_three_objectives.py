@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from resumed import assert_goes_on_to_the_same_bytes
 from scripts import run_script
 
 from analysis import make_tables
-from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts, run_folder
 
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("ppo_gated", "ppo_curriculum", "eupg_var_lambda")]
@@ -27,24 +27,9 @@ def train(script, folder, *more):
 
 @pytest.mark.parametrize("script", [*SLOW, "eupg_fixed_lambda"])
 def test_a_third_objective_is_trained_evaluated_resumed_and_tabulated(script, tmp_path, monkeypatch):
-    whole, stopped = tmp_path / "runs" / "whole", tmp_path / "stopped"
     monkeypatch.setattr(run_folder, "CHECKPOINT_STEPS", 128)
-    train(script, whole)
-
-    save = protocol.Run.save
-
-    def save_once(run, global_step, last, **state):
-        save(run, global_step, last, **state)
-        if run.checkpoint_step:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as once, pytest.raises(SystemExit):
-        once.setattr(protocol.Run, "save", save_once)
-        train(script, stopped)
-    assert not (stopped / "evaluation.csv").exists()
-    train(script, stopped)
-    for name in ("episodes.csv", "updates.csv", "evaluation.csv", "policy.pt", "summary.png"):
-        assert (whole / name).read_bytes() == (stopped / name).read_bytes(), name
+    whole = tmp_path / "whole"
+    assert_goes_on_to_the_same_bytes(lambda folder: train(script, folder), tmp_path)
 
     episodes, evaluation = (pd.read_csv(whole / f"{name}.csv") for name in ("episodes", "evaluation"))
     for table in (episodes, evaluation):
@@ -60,7 +45,7 @@ def test_a_third_objective_is_trained_evaluated_resumed_and_tabulated(script, tm
     if "fixed" in script:
         assert (episodes[WEIGHTS] == given[0]).all(axis=None)
 
-    make_tables.main(make_tables.Args(runs_dir=(tmp_path / "runs",), tables_dir=tmp_path / "tables"))
+    make_tables.main(make_tables.Args(runs_dir=(whole,), tables_dir=tmp_path / "tables"))
     assert "timber" in "".join(path.read_text() for path in (tmp_path / "tables").glob("*.csv"))
 
 
