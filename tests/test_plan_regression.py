@@ -14,7 +14,7 @@ from cleanrl_style import protocol
 from cleanrl_style.plan_regression import PLANS, Agent, closest_to_the_best, make_policy
 from cleanrl_style.protocol import run_folder
 
-gym.register("blind-v0", entry_point="boreal_env:BorealEnv", kwargs={"observation_groups": ("preference", "climate")})
+gym.register("no-site-v0", entry_point="boreal_env:BorealEnv", kwargs={"observation_groups": ("preference", "climate")})
 
 SCRIPT = "cleanrl_style/plan_regression.py"
 QUICK = "quick_env:quick-v0"
@@ -158,7 +158,7 @@ def test_async_gives_the_same_episodes(tmp_path):
         (("--ridge", 0), r"--ridge must lie in \[0.001, 1000000000\], not 0"),
         (("--finalists", 5), "--finalists.* 5"),
         (("--total-timesteps", 50), "--total-timesteps 50: at least 336, a round, is allowed"),
-        (("--env-id", "blind-v0"), "--env-id blind-v0: it observes no site parameters by name; --hide-site is allowed"),
+        (("--env-id", "no-site-v0"), "--env-id no-site-v0: it observes no site parameters by name; --hide-site is"),
         (("--env-id", "toy_env:toy-lockstep-v0"), "the plans are of the boreal environments alone"),
     ],
 )
