@@ -149,11 +149,6 @@ if __name__ == "__main__":
     if not num_rounds:
         protocol.fail(f"--total-timesteps {args.total_timesteps}: at least {steps_a_round}, a round, is allowed")
     screening_rounds = max(1, round(args.screening * num_rounds))
-    print(f"{num_rounds} rounds: {num_rounds * steps_a_round:,} of {args.total_timesteps:,} steps", end="; ")
-    if screening_rounds < num_rounds:
-        print(f"from round {screening_rounds + 1} on {args.finalists} of {len(PLANS)} plans", flush=True)
-    else:
-        print(f"all {len(PLANS)} plans in each, as none is left for --finalists", flush=True)
     update_columns = ("round", "global_step", "sites", "plans", "explained_variance")
 
     with protocol.Run(args, task, __file__, episodes=task.episode_columns, updates=update_columns) as run:
@@ -162,6 +157,12 @@ if __name__ == "__main__":
         np.random.seed(args.seed)
         torch.manual_seed(args.seed)
         torch.set_num_threads(1)
+
+        print(f"{num_rounds} rounds: {num_rounds * steps_a_round:,} of {args.total_timesteps:,} steps", end="; ")
+        if screening_rounds < num_rounds:
+            print(f"from round {screening_rounds + 1} on {args.finalists} of {len(PLANS)} plans", flush=True)
+        else:
+            print(f"all {len(PLANS)} plans in each, as none is left for --finalists", flush=True)
 
         # env setup
         envs = run.make_envs()
