@@ -65,10 +65,11 @@ def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def welch_interval(first, second) -> tuple[float, float]:
-    """Ends of the 95 % interval of one mean less another, by Welch's t; NaN of two single values.
+    """Ends of the 95 % interval of one mean less another, by Welch's t, of values (n,) and (k,).
 
-    Of a single value, which has no spread, the other side's counts alone.
+    Of a single value, which has no spread, the other side's counts alone; of two single values both ends are NaN.
     """
+    # not scipy's: it takes no single value, and warns of equal ones, as trainings have that learned to do nothing
     sides = [np.asarray(values, dtype=float) for values in (first, second)]
     difference = sides[0].mean() - sides[1].mean()
     variances = [(side.var(ddof=1) / len(side), len(side)) for side in sides if len(side) > 1]

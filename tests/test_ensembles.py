@@ -30,7 +30,7 @@ def test_what_most_are_sure_of_is_chosen_and_nothing_invalid():
 
 def test_too_few_policies_are_named(tmp_path, monkeypatch):
     monkeypatch.setattr(paths, "archive", lambda: tmp_path)
-    with pytest.raises(SystemExit, match="ppo_group: two policies and more of boreal-.*-v0 are needed"):
+    with pytest.raises(SystemExit, match="ppo_group: two policies or more of boreal-.*-v0 are needed"):
         ensembles.main(ensembles.Args())
 
 

@@ -77,8 +77,8 @@ def main(args: Args) -> None:
     archive = paths.there(paths.archive())
     there = {task_id: policies_of(archive / SCRIPT / f"{task_id}-vectorization=lockstep") for task_id in TASKS}
     if lacking := [task_id for task_id, files in there.items() if len(files) < 2]:
-        made_by = "python analysis/reproduce.py --only main balanced, python analysis/archive.py"
-        protocol.fail(f"{archive / SCRIPT}: two policies and more of {lacking[0]} are needed ({made_by})")
+        commands = "python analysis/reproduce.py --only main balanced, python analysis/archive.py"
+        protocol.fail(f"{archive / SCRIPT}: two policies or more of {lacking[0]} are needed ({commands})")
     digest = hashlib.sha256(b"".join(file.read_bytes() for files in there.values() for file in files.values()))
     made_by = {"episodes": episodes, "physics": reference.physics_name(), "policies": digest.hexdigest()[:16]}
     if stored.is_finished(path(args.quick), made_by):
