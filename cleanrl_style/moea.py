@@ -218,6 +218,13 @@ if __name__ == "__main__":
         protocol.fail(f"--block-years {args.block_years} is for --genome plan")
     if args.genome == "plan" and args.block_years > task.years:
         protocol.fail(f"--block-years {args.block_years}: at most the episode's {task.years} is allowed")
+    looked_at = task.make()
+    names = looked_at.unwrapped.observation_names
+    wanted = ("year",) if args.genome == "plan" else INPUTS
+    lacking = [name for name in wanted if name not in names and not name.startswith("site_")]
+    if lacking or len(names) != looked_at.observation_space.shape[0]:
+        what = lacking[0] if lacking else "entries by name, and a wrapper changes what is observed"
+        protocol.fail(f"--env-id {args.env_id}: candidates look at {what}")
     steps_a_generation = args.num_envs * task.years
     num_generations = args.total_timesteps // steps_a_generation
     if not num_generations:
@@ -238,12 +245,6 @@ if __name__ == "__main__":
         seeds = [start_seed + k for _ in range(args.population) for k in range(episodes_each)]
         lattice = np.array([task.check_weights(w) for w in fronts.evaluation_weights(task.num_objectives)])
 
-        names = task.make().unwrapped.observation_names
-        wanted = ("year",) if args.genome == "plan" else INPUTS
-        lacking = [name for name in wanted if name not in names and not name.startswith("site_")]
-        if lacking or len(names) != envs.single_observation_space.shape[0]:
-            what = lacking[0] if lacking else "entries by name, and a wrapper changes what is observed"
-            protocol.fail(f"--env-id {args.env_id}: candidates look at {what}")
         inputs = [names.index(name) for name in wanted if name in names]
         blocks = -(-task.years // args.block_years) if args.genome == "plan" else 0
         shape = {"inputs": inputs, "num_blocks": blocks, "block_years": args.block_years}

@@ -1,16 +1,18 @@
-"""That archived runs repeat from their command: their beginning, up to the first time that the policy is scored."""
+"""That archived runs repeat from their command: the first fortieth of their training."""
 
 import zipfile
 
+import numpy as np
 import pandas as pd
 import pytest
 import torch
 from scripts import ROOT, run_script
 
+from analysis import reduction
 from cleanrl_style.protocol import run_folder
-from cleanrl_style.protocol.course import Course
 
 BALANCED = ("--env-id", "boreal-balanced-v0")
+STEPS = 300_000
 
 
 @pytest.mark.slow
@@ -23,23 +25,22 @@ BALANCED = ("--env-id", "boreal-balanced-v0")
         ("plan_regression/boreal-balanced-v0-vectorization=lockstep", BALANCED),
     ],
 )
-def test_the_first_updates_of_an_archived_run_repeat(folder, flags, tmp_path, monkeypatch):
-    """Each gain is of a policy after some updates, on ten sites: no update can change and leave it alone.
+def test_the_beginning_of_an_archived_run_repeats(folder, flags, tmp_path, monkeypatch):
+    """Episodes are those of an agent that has learned from one rollout (Group PPO) or three (Curriculum PPO).
 
-    Plan regression's finals, after a fifth of the training, are not reached.
+    Plan regression plays all plans until after that, whatever it learns.
     """
-    play = Course.play
 
-    def play_and_stop(course, policy):
-        play(course, policy).to_csv(tmp_path / "again.csv", float_format=run_folder.FLOAT_FORMAT, index=False)
-        raise KeyboardInterrupt
+    def stop(run, global_step, last, policy):
+        if global_step >= STEPS / reduction.BINS:
+            raise KeyboardInterrupt
 
-    monkeypatch.setattr(Course, "play", play_and_stop)
+    monkeypatch.setattr(run_folder.Run, "validate", stop)
     with pytest.raises(SystemExit, match="130"):
         script = f"cleanrl_style/{folder.split('/')[0]}.py"
         run_script(script, "--seed", 1, "--vectorization", "lockstep", *flags, "--run-dir", tmp_path / "run")
     with zipfile.ZipFile(ROOT / "results" / "runs" / folder / "seed1" / "tables.zip") as tables:
-        archived = pd.read_csv(tables.open("validation.csv"))
-    again = pd.read_csv(tmp_path / "again.csv")
-    assert len(again) == 3
-    pd.testing.assert_frame_equal(again, archived[list(again)].head(3), rtol=5e-6)  # archives have six digits
+        archived = pd.read_csv(tables.open("learning.csv")).iloc[0]
+    again = reduction.learning(pd.read_csv(tmp_path / "run" / "episodes.csv"), STEPS).iloc[0]
+    assert again.episodes >= 84
+    np.testing.assert_allclose(again.to_numpy(dtype=float), archived.to_numpy(dtype=float), rtol=1e-11)

@@ -1,4 +1,7 @@
-"""A third objective, as a user would add one: the boreal environment, paid for the wood that is cut, under an id."""
+"""A third objective, as a user would add one: the boreal environment, paid for the wood that is cut, under an id.
+
+Four years of six steps a day.
+"""
 
 import gymnasium as gym
 
@@ -13,5 +16,9 @@ def harvest(year):
 gym.register(
     "timber-v0",
     entry_point="boreal_env:BorealEnv",
-    kwargs={"objectives": ("carbon", "thaw", Objective("timber", harvest, 0.0, 1.0)), "years": 4},
+    kwargs={
+        "objectives": ("carbon", "thaw", Objective("timber", harvest, 0.0, 1.0)),
+        "years": 4,
+        "time_step_minutes": 240,
+    },
 )

@@ -12,10 +12,11 @@ from sim.io.table import Table
 DAY = 1440  # minutes
 MOST_MINUTES = 120
 _FORMATS = {8: "%Y%m%d", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
-_DAY_END = re.compile(r"(^\d{8}|[ T])24(:?00(?::?00)?)$")  # 24:00
+_DAY_END = re.compile(r"(^\d{8}|[ T])24(:?00(?::?00)?)$", re.MULTILINE)  # 24:00
 _DAY_FIRST = re.compile(r"\d{1,2}[./-]\d{1,2}[./-]\d{2,4}\b")
 _SERIAL = re.compile(r"[1-9]\d{4}(\.\d+)?$|1\d{9}(\.\d+)?$")  # days of a spreadsheet, seconds since 1970
-_WITH_ZONE = re.compile(r"(:\d\d(?:\.\d+)?)\s?(?:Z|[+-]\d\d(?::?\d\d)?)$")
+_WITH_ZONE = re.compile(r"(:\d\d(?:\.\d+)?)\s?(?:Z|[+-]\d\d(?::?\d\d)?)$", re.MULTILINE)
+_WHOLE = re.compile(r"\.0$", re.MULTILINE)  # a number read as one with decimals
 
 
 def read_times(table: Table, texts: pd.Series, name: str, *, zone: bool = True) -> pd.DatetimeIndex:
@@ -24,12 +25,12 @@ def read_times(table: Table, texts: pd.Series, name: str, *, zone: bool = True) 
     if pd.api.types.is_datetime64_any_dtype(texts):
         times = pd.Series(texts) if zone else pd.Series(texts).dt.tz_localize(None)
     else:
-        text = texts.astype("string").str.strip().str.replace(r"\.0$", "", regex=True)
-        given, text = text, text.str.replace(_DAY_END, r"\g<1>00\g<2>", regex=True)
+        given = _replaced(texts.astype("string").str.strip(), _WHOLE, "")
+        text = _replaced(given, _DAY_END, r"\g<1>00\g<2>")
         day_end = (text != given).fillna(False)
         known = text.dropna()
         first = known.iloc[0] if len(known) else ""
-        written = text.str.replace(_WITH_ZONE, r"\g<1>", regex=True)
+        written = _replaced(text, _WITH_ZONE, r"\g<1>")
         if first.isdigit():
             # of fewer digits pandas would take the hour's second digit for the minute
             length = len(first) if len(first) in _FORMATS else 0
@@ -58,6 +59,11 @@ def read_times(table: Table, texts: pd.Series, name: str, *, zone: bool = True) 
             f"{table.where(row)}: {name} is {value!r}; a time as 201906031230 or 2019-06-03 12:30 is allowed{hint}"
         )
     return pd.DatetimeIndex(times)
+
+
+def _replaced(text: pd.Series, pattern: re.Pattern, by: str) -> pd.Series:
+    """Texts with a pattern of a line replaced. Most columns have none, and to look at all of them at once is quick."""
+    return text.str.replace(pattern, by, regex=True) if pattern.search("\n".join(text.dropna().to_numpy())) else text
 
 
 def check_ends(table: Table, starts: pd.DatetimeIndex, ends: pd.DatetimeIndex) -> None:
