@@ -167,7 +167,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `boreal_env.OBSERVATION` has the name, unit, normalisation and limits of each, `observation_names` the names of
     those that this environment gives. The first is the preference for carbon (of m objectives the weights of the first
     m - 1; a single objective has none). Where two years are given, the most recent is first. Age fractions are of all
-    stems.
+    stems: seedlings of 0-5 years, saplings 6-20, young 21-40, mature 41-100, old from 101.
 
     ## Action Space
     `Discrete(25)`: action = 5 x density index + mix index; density changes (-100, -50, 0, 50, 100) stems/ha, conifer
@@ -209,11 +209,12 @@ class BorealEnv(Described, gym.Env, EzPickle):
     After 50 years the episode is terminated: nothing is worth anything beyond.
 
     ## Arguments
-    - `mode`: "generalist" or "site-specific"
+    - `mode`: "generalist" (unless `gym.make` has another id) or "site-specific"
     - `years`: length of an episode (50)
     - `time_step_minutes`: a divisor of 1440, at most 120 (30)
     - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (a GPU, for thousands)
-    - `thaw_formulation`: "asymmetric", "contrast" or "raw_degree_days"
+    - `thaw_formulation`: "asymmetric" (heat up less 2.5 times heat down, over 40 MJ/m2), "contrast" ((up - down) /
+      (up + down)) or "raw_degree_days" ((up - down) over 40 MJ/m2; the name is the paper's)
     - `fixed_preference`: weight of carbon in [0, 1] instead of a drawn one, or the weights of all objectives
     - `site_seed`: one site (`sim.sample_site(site_seed)`) instead of a new one each episode
     - `parameter_overrides`: site parameter -> value or (low, high), see `sim/site_parameters.csv`; nothing else of the

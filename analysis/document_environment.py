@@ -74,9 +74,10 @@ year,
 
 Before the first year both indices are those of an action that changes nothing: the middle density, the nearest mix.
 
-`boreal_env.action_masks(observations)` reads whole observations, 43 or 105 columns; with `observation_groups`, ask the
-environment: `env.unwrapped.action_masks()` or `env.unwrapped.mask_function()`. `boreal_env.in_unit(observations,
-"density")` gives an entry in its unit again.
+`boreal_env.action_masks(observations)` reads whole observations, 43 or 105 columns; of m objectives give
+`objectives=m`, and with `observation_groups` ask the environment: `env.unwrapped.action_masks()` or
+`env.unwrapped.mask_function()`. `boreal_env.in_unit(observations, "density", env.unwrapped.observation_names)` gives an
+entry in its unit again, of observations (n, d); `observation[None]` makes one of one.
 
 {table(("index", "name", "unit", "normalised", "limits", "group"), map(observation_row, enumerate(rows)))}
 

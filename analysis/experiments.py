@@ -295,7 +295,9 @@ class Experiment(NamedTuple):
 
 
 EXPERIMENTS = {
-    "main": Experiment(main_table, "main table: heuristics, constant plans, and every method of ours with 10 seeds"),
+    "main": Experiment(
+        main_table, "main table: fixed strategies and plans; the paper's methods and group PPO, 10 seeds"
+    ),
     "balanced": Experiment(balanced, "the same where both objectives weigh alike"),
     "group": Experiment(group, "group PPO with one choice changed, such as the size of groups"),
     "outside": Experiment(outside, "algorithms of other libraries, on both tasks"),

@@ -34,11 +34,10 @@ import numpy as np
 import pandas as pd
 import tyro
 
-import boreal_env
 from analysis import metrics, paths, runs, stored
 from cleanrl_style import protocol
 from cleanrl_style.protocol import reference, sites
-from cleanrl_style.protocol.arguments import ask
+from cleanrl_style.protocol.arguments import ask, groups_without_site
 from cleanrl_style.protocol.score import Comparison
 
 TEST, OUTSIDE, SEARCHED = "test", "outside", "test, best plans"
@@ -163,7 +162,8 @@ def task_of(config: dict) -> protocol.Task:
     arguments = config["arguments"]
     kwargs = {"thaw_formulation": arguments["thaw_formulation"]} if "thaw_formulation" in config["not_default"] else {}
     if arguments.get("hide_site"):
-        kwargs["observation_groups"] = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
+        ask(arguments["env_id"], "environment")  # which registers what a module brings
+        kwargs["observation_groups"] = groups_without_site(arguments["env_id"])
     return ask(arguments["env_id"], "environment", **kwargs)
 
 

@@ -188,7 +188,7 @@ def add(row: dict, root: Path) -> None:
     text = SECTION.sub(lambda match: match[1] + markdown(COLUMNS, cells) + match[2], page)
     table["steps"] = table.steps.astype("Int64")
     with protocol.replacing(root / TABLE) as file:
-        table.to_csv(file, index=False, float_format="%.4g", lineterminator="\n")
+        table.to_csv(file, index=False, float_format="%.6g", lineterminator="\n")
     with protocol.replacing(root / PAGE) as file:
         file.write(text.encode())
 

@@ -54,8 +54,8 @@ def main(script: str, policy) -> None:
 
     script : its file, `__file__`.
 
-    It does not look at the preference: its episodes are the same under every weight, and are simulated once. None has
-    another policy when greedy: random actions stay random.
+    It does not look at the preference: its episodes are the same under every weight, and are simulated once. One that
+    does is refused in the first year. None has another policy when greedy: random actions stay random.
     """
     args = parse(Args)  # a bad flag is answered before all that follows is loaded
 
@@ -67,6 +67,8 @@ def main(script: str, policy) -> None:
     task = protocol.make_task(args)
     if not task.boreal:
         protocol.fail(f"--env-id {args.env_id}: fixed strategies know the boreal environments alone")
+    if not task.bare:
+        protocol.fail(f"--env-id {args.env_id}: a wrapper may change what fixed strategies look at; none is allowed")
     seen = task.make().unwrapped.observation_names
     needed = {row.name for row in boreal_env.OBSERVATION if row.group != "site"} - {"preference"}
     if task.masks is None or not task.observes_preference or not needed <= set(seen):
@@ -77,7 +79,13 @@ def main(script: str, policy) -> None:
 
     def action_probabilities(observations, masks, accrued_returns):
         # laid out as for two objectives, whatever their number: a strategy does not look at the weights
-        return played(observations[:, task.num_objectives - 2 :], masks)
+        observations = observations[:, task.num_objectives - 2 :]
+        probabilities = played(observations, masks)
+        others = observations.copy()
+        others[:, 0] = 1.0 - others[:, 0]
+        if not np.array_equal(probabilities, played(others, masks)):
+            protocol.fail(f"{script}: it looks at the preference, and is played once for all; protocol.evaluate can")
+        return probabilities
 
     with protocol.Run(args, task, script) as run:
         start = time.perf_counter()

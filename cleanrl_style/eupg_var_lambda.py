@@ -155,8 +155,8 @@ def eupg_loss(agent, x, mask, action, utility):
 
 
 if __name__ == "__main__":
-    if args.scalarization == "chebyshev" and args.utility == "future":
-        protocol.fail("--utility future is for --scalarization linear; for chebyshev total is allowed")
+    if args.scalarization != "linear" and args.utility == "future":
+        protocol.fail(f"--utility future is for --scalarization linear; for {args.scalarization} total is allowed")
     if args.baseline == "others" and args.num_envs == 1:
         protocol.fail("--baseline others is the mean of a batch's other episodes: --num-envs 2 or more is allowed")
     task = protocol.make_task(args, hide_site=args.hide_site)

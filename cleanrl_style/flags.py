@@ -174,7 +174,8 @@ def in_plain_words(message: str) -> str:
     if several := SEVERAL.fullmatch(message):
         return f"{several[1]} {words_of(several[2])}: not of the kind that --help shows"
     if choice := CHOICE.fullmatch(message):
-        allowed = sorted({*words_of(choice[3]).split()} - {"None"})
+        allowed = {*words_of(choice[3]).split()} - {"None"}
+        allowed = sorted(allowed, key=lambda word: (word.isdigit() and int(word), word))
         return f"{choice[2]} {choice[1]}: {', '.join(allowed)} are allowed"
     found = PARSING.fullmatch(message)
     if not found:

@@ -225,8 +225,7 @@ class Curriculum:
     def __init__(self, task, args):
         self.coin = np.random.default_rng([args.seed, 1]) if args.selector == "coin" else None
         self.site_entries = list(task.site_entries)  # of the observation
-        sees_sites = (task.draws_sites or not task.boreal) and len(self.site_entries) > 0
-        self.accepts_all = self.coin is None and not sees_sites
+        self.accepts_all = self.coin is None and not self.sees_sites(task)
         self.threshold = 0.0 if self.accepts_all else args.threshold
         # a generator of its own: the agent is the one that ppo_gated starts from
         generator = np.random.default_rng(args.seed)
@@ -240,6 +239,11 @@ class Curriculum:
         self.shape = (10,) * (task.num_objectives - 1)
         self.decile_sum, self.decile_count = np.zeros(self.shape).ravel(), np.zeros(self.shape).ravel()
         self.finished = []
+
+    @staticmethod
+    def sees_sites(task):
+        """Whether episodes differ in a site that is observed."""
+        return (task.draws_sites or not task.boreal) and len(task.site_entries) > 0
 
     def logit(self, sites):
         for layer in self.layers[:-1]:
@@ -275,7 +279,7 @@ class Curriculum:
 
 
 if __name__ == "__main__":
-    if args.scalarization == "chebyshev" and args.per_objective_advantages:
+    if args.scalarization != "linear" and args.per_objective_advantages:
         protocol.fail("--per-objective-advantages is for --scalarization linear: it weighs each advantage by itself")
     task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns
@@ -291,6 +295,10 @@ if __name__ == "__main__":
         protocol.fail("--raw-selector is for --selector network: a coin has no logit")
     if args.selector == "network" and args.hide_site:
         protocol.fail("--hide-site leaves --selector network nothing to score; --selector coin has no need of the site")
+    if args.selector == "network" and not Curriculum.sees_sites(task):
+        for flag, given in (("--raw-selector", args.raw_selector), ("--threshold", args.threshold != Args.threshold)):
+            if given:
+                protocol.fail(f"{flag}: {args.env_id} shows no sites to choose from; without it all are selected")
     episode_columns += ("score", "threshold", "selected")
     update_columns += ("threshold", "selected_episodes", "skipped_episodes", "selected_transitions")
 

@@ -209,7 +209,7 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, old_value
 
 
 if __name__ == "__main__":
-    if args.scalarization == "chebyshev" and args.per_objective_advantages:
+    if args.scalarization != "linear" and args.per_objective_advantages:
         protocol.fail("--per-objective-advantages is for --scalarization linear: it weighs each advantage by itself")
     task = protocol.make_task(args, hide_site=args.hide_site)
     episode_columns = task.episode_columns

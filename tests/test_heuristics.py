@@ -1,4 +1,5 @@
 import importlib.util
+import sys
 
 import gymnasium as gym
 import numpy as np
@@ -6,6 +7,8 @@ import pandas as pd
 import pytest
 from scripts import ROOT, run_script
 
+import baselines_heuristic
+import boreal_env
 from analysis.runs import read_run
 from baselines_heuristic import conifer_restoration, plus_100, random_valid, target_density, zero_change
 from boreal_env import NO_CHANGE
@@ -107,6 +110,20 @@ def test_users_environments_are_refused(tmp_path):
         with pytest.raises(SystemExit, match="observation_groups must have them"):
             run_script("baselines_heuristic/target_density.py", "--env-id", name, "--run-dir", tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def test_a_strategy_that_looks_at_the_preference_is_refused(tmp_path, monkeypatch):
+    """Its episodes would be of one preference, and be scored at all."""
+    given = ["own.py", "--env-id", "boreal-timber-v0", "--eval-episodes", "2", "--run-dir", str(tmp_path / "run")]
+    monkeypatch.setattr(sys, "argv", given)
+    with pytest.raises(SystemExit, match="own.py: it looks at the preference, and is played once for all"):
+        baselines_heuristic.main("own.py", lambda observations, masks: np.where(observations[:, 0] < 0.1, 24, 20))
+
+
+def test_what_a_wrapper_may_change_is_refused(tmp_path):
+    gym.register("wrapped-v0", lambda **kwargs: gym.wrappers.TransformReward(boreal_env.BorealEnv(**kwargs), abs))
+    with pytest.raises(SystemExit, match="--env-id wrapped-v0: a wrapper may change what fixed strategies look at"):
+        run_script("baselines_heuristic/zero_change.py", "--env-id", "wrapped-v0", "--run-dir", tmp_path / "run")
 
 
 @pytest.mark.parametrize("env_id", ["boreal-generalist-v0", "boreal-balanced-v0"])

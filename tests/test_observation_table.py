@@ -288,8 +288,11 @@ def test_entries_can_be_read_in_their_unit():
     assert boreal_env.in_unit(observations, "latitude", env.observation_names)[0] == pytest.approx(60.5, rel=1e-6)
     with pytest.raises(ValueError, match="the observation has no entry 'densities'"):
         boreal_env.in_unit(observations, "densities")
-    with pytest.raises(ValueError, match=r"shape \(n, 43\) or wider is allowed .* got \(2, 10\)"):
-        boreal_env.in_unit(np.zeros((2, 10)), "density")
+    for shape in ((2, 10), (2, 106), (105,)):  # of three objectives entries are elsewhere
+        with pytest.raises(ValueError, match=r"shape \(n, 43\) or \(n, 105\) is allowed without names, got "):
+            boreal_env.in_unit(np.zeros(shape), "density")
+    with pytest.raises(ValueError, match=r"shape \(n, 43\) or wider is allowed with these names, got \(2, 10\)"):
+        boreal_env.in_unit(np.zeros((2, 10)), "density", env.observation_names)
     assert boreal_env.in_unit(np.full((1, 43), 0.3), "preference") == pytest.approx(0.3)
     with pytest.raises(ValueError, match="observations of 43 entries have no 'site_latitude_deg'"):
         boreal_env.in_unit(observations, "site_latitude_deg")

@@ -156,7 +156,7 @@ def test_async_gives_the_same_episodes(tmp_path):
         (("--total-timesteps", 335), "--total-timesteps 335: at least 336, a round, is allowed"),
         (("--screening", 1.5), r"--screening must lie in \[0, 1\], not 1.5"),
         (("--ridge", 0), r"--ridge must lie in \[0.001, 1000000000\], not 0"),
-        (("--finalists", 5), "--finalists.* 5"),
+        (("--finalists", 5), "--finalists 5: 3, 4, 6, 7, 12, 21 are allowed"),
         (("--total-timesteps", 50), "--total-timesteps 50: at least 336, a round, is allowed"),
         (("--env-id", "no-site-v0"), "--env-id no-site-v0: it observes no site parameters by name; --hide-site is"),
         (("--env-id", "toy_env:toy-lockstep-v0"), "the plans are of the boreal environments alone"),

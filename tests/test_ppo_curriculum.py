@@ -462,6 +462,8 @@ def test_learns_the_toy(tmp_path):
         (["--hide-site", "--env-id", "toy_env:toy-v0"], "--env-id toy_env:toy-v0 observes no site parameters"),
         (["--hide-site"], "--hide-site leaves --selector network nothing to score"),
         (["--selector", "coin", "--raw-selector"], "--raw-selector is for --selector network"),
+        (["--mode", "site-specific", "--raw-selector"], "--raw-selector: boreal-site-specific-v0 shows no sites to"),
+        (["--site-seed", "7", "--threshold", "0.9"], "--threshold: boreal-generalist-v0 shows no sites to choose from"),
     ],
 )
 def test_bad_arguments_leave_nothing_behind(arguments, message, tmp_path):

@@ -8,11 +8,12 @@ from scripts import run_script
 from toy_env import ToyEnv, ToyVectorEnv
 
 import boreal_env
-from cleanrl_style import protocol
+from cleanrl_style import ppo_gated, protocol
 from cleanrl_style.protocol import task as asked
 from cleanrl_style.protocol import training_envs
 from sim.block import lanes_for
 from sim.stands import available_cores
+from sim.task.shifts import SHIFTS
 
 gym.register("short-v0", entry_point="boreal_env:BorealEnv", kwargs={"years": 3})
 gym.register("own-masks-v0", entry_point="boreal_env:BorealEnv", kwargs={"harvest_min_class": "old", "years": 3})
@@ -59,6 +60,17 @@ def test_sites_of_another_kind_are_not_centred_by_ours():
     task = protocol.Task("sites-v0", {}, ("carbon", "thaw"), site_entries=(43, 44, 45))
     with pytest.raises(SystemExit, match="it observes 3 site parameters, ours 62.*--raw-selector"):
         task.sample_sites(range(3))
+
+
+def test_what_an_id_was_registered_with_stays():
+    """Under --hide-site the groups of its observation, out of the sampled range its own parameters."""
+    groups, own = ("preference", "state", "age", "site"), {"latitude_deg": 58.0}
+    kwargs = {"observation_groups": groups, "parameter_overrides": own}
+    gym.register("narrow-v0", "boreal_env:BorealEnv", kwargs=kwargs)
+    args = ppo_gated.Args(env_id="narrow-v0")
+    assert protocol.make_task(args, hide_site=True).env_kwargs["observation_groups"] == groups[:-1]
+    calmer = protocol.Task.of("narrow-v0").shifted("calmer").env_kwargs["parameter_overrides"]
+    assert calmer == {**own, **SHIFTS["calmer"]}
 
 
 def test_ids_of_the_benchmark():

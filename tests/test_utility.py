@@ -41,6 +41,9 @@ def test_a_utility_of_ones_own_is_what_training_and_score_are_of(monkeypatch):
     given = {"env_id": "boreal-balanced-v0", "mode": None, "site_seed": None, "thaw_formulation": None}
     args = SimpleNamespace(**given, eval_weights=None, eval_episodes=2, scalarization="soft")
     assert isinstance(arguments.make_task(args).utility, Soft)
+    args.reward_scales = (2.0, 1.0)
+    with pytest.raises(SystemExit, match="--reward-scales: --scalarization soft is of rewards as they are: 1 each"):
+        arguments.make_task(args)
     args.scalarization = "softer"
     with pytest.raises(SystemExit, match="--scalarization softer: allowed are linear, chebyshev, soft"):
         arguments.make_task(args)

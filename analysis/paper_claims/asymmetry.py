@@ -32,6 +32,7 @@ from analysis.paper_claims.evidence import (
     only,
     optional,
     seeds,
+    unpaired,
 )
 from analysis.studies.constant_plans import as_evaluation, best_gains, of_environment
 from analysis.tables import single_sites
@@ -120,6 +121,7 @@ def asymmetry(evidence):
         Row("share learnt of carbon", "", seeds(carbon)),
         Row("share learnt of thaw", "", seeds(thaw)),
         Row("carbon less thaw", "above 0", apart),
+        Row("the same, seeds not paired", "", unpaired(carbon, thaw)),
     ]
     return finding(rows, above(apart, what="the difference"))
 

@@ -114,7 +114,8 @@ TRAINING = (
     "With 16 workers training takes 1 to 2 hours: it scales well with cores.",
     "Appendix, runtime",
     BENCHMARK,
-    note="Needs a machine of as many cores; ours has fewer unless the benchmark has the row.",
+    note="Needs a training on a machine of as many cores, as the benchmark's row; docs/scaling.md has what the "
+    "simulator alone does on sixteen.",
 )
 def workers(evidence):
     table = evidence.beside("benchmark.csv", pd.read_csv)
@@ -185,7 +186,8 @@ def memory_of_all(evidence):
     "Appendix, runtime",
     only("main"),
     note="For the whole machine of sixteen virtual cores (on demand, Linux, Northern Virginia; the price is from "
-    "AWS's documentation of Auto Scaling), though a training of ours uses one of them; evaluation included.",
+    "AWS's documentation of Auto Scaling), though a training of ours uses one of them; evaluation included. "
+    "The time is that of another, faster processor.",
 )
 def dollars(evidence):
     spent = pd.Series(

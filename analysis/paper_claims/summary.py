@@ -64,9 +64,9 @@ SENTENCES = (
     Sentence(
         asymmetry.asymmetry,
         "carbon less thaw",
-        "EUPG learns carbon better than thaw",
-        "EUPG learns carbon no better than thaw",
-        "Whether EUPG learns carbon better than thaw is open",
+        "Fixed λ EUPG learns carbon better than thaw, by agents of equal seeds",
+        "Fixed λ EUPG learns carbon no better than thaw",
+        "Whether Fixed λ EUPG learns carbon better than thaw is open",
     ),
     Sentence(
         asymmetry.physics_hides_thaw,

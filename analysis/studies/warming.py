@@ -274,12 +274,13 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         f"**How does that compare with what is published?** Under no change, {last} against the same years without a "
         "scenario. Thaw is the median, with its range, of the sites that are frozen in both; volume is of the sites "
         f"frozen in {today}, the last row of those frozen in {last} without a scenario.",
-        "*What explains what.* Less is lost per K than AR6 says, and too late: the boundary of fixed temperature at "
-        "12 m goes on taking up heat, and below the upper metres the ground warms less than it would. Thaw is too "
-        "deep where the ground stays frozen: the boundary works against that, so it is no explanation, and we count "
-        "it as a miss. Peng et al. have all permafrost, most of it north of these sites, and Stefan's equation; what "
-        "makes the difference has not been tested. More sites are lost than Peng et al. lose of their area, and fewer "
-        "than the middle of the IPCC's range under SSP1-2.6 and than its whole range under SSP5-8.5.",
+        "*What explains what.* Less is lost per K than AR6 says: the boundary of fixed temperature at 12 m goes on "
+        "taking up heat, and below the upper metres the ground warms less than it would. Where the ground stays "
+        "frozen, thaw deepens too much under ssp245 and ssp585: the boundary works against that, so it is no "
+        "explanation, and we count it as a miss. Peng et al. have all permafrost, most of it north of these sites, "
+        "and Stefan's equation; what makes the difference has not been tested. More sites are lost than Peng et al. "
+        "lose of their area, and fewer than the middle of the IPCC's ranges under SSP1-2.6 and SSP5-8.5, though inside "
+        "both.",
         "**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of no change and of the best "
         "plan for thaw alone, for both alike and for carbon alone; the share of sites whose best plan for both is "
         "another one than without a scenario; and the share of years, of all plans, in which the thaw reward is "

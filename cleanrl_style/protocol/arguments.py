@@ -53,9 +53,9 @@ def make_task(args, *, preference=None, hide_site: bool = False) -> Task:
     for name in env_kwargs if not registered.boreal else ():
         fail(f"--{name.replace('_', '-')} is for boreal environments, not for --env-id {args.env_id}")
     if hide_site:
-        env_kwargs["observation_groups"] = tuple(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
         if not registered.boreal or not registered.site_entries:
             fail(f"--hide-site: --env-id {args.env_id} observes no site parameters")
+        env_kwargs["observation_groups"] = groups_without_site(args.env_id)
     task = ask(args.env_id, **env_kwargs)
     if preference is None and hasattr(args, "total_timesteps") and not task.observes_preference:
         fail(f"--env-id {args.env_id}: its observation lacks the preference; observation_groups must have that group")
@@ -84,9 +84,9 @@ def make_task(args, *, preference=None, hide_site: bool = False) -> Task:
     if scalarization not in SCALARIZATIONS:
         allowed = f"allowed are {', '.join(SCALARIZATIONS)} (cleanrl_style/protocol/utility.py)"
         fail(f"--scalarization {scalarization}: {allowed}")
+    if scalarization != "linear" and any(scale != 1.0 for scale in getattr(args, "reward_scales", ())):
+        fail(f"--reward-scales: --scalarization {scalarization} is of rewards as they are: 1 each is allowed")
     if SCALARIZATIONS[scalarization] is Chebyshev:
-        if any(scale != 1.0 for scale in getattr(args, "reward_scales", ())):
-            fail("--reward-scales: the ideal point of --scalarization chebyshev is of rewards as they are: 1 each")
         return dataclasses.replace(task, utility=Chebyshev(ideal_point(task, args.ideal_point)))
     if getattr(args, "ideal_point", None) is not None:
         fail("--ideal-point is for --scalarization chebyshev")
@@ -113,6 +113,12 @@ def ideal_point(task: Task, given=None) -> tuple[float, ...]:
     if len(given) != task.num_objectives or not np.isfinite(given).all():
         fail(f"--ideal-point: {task.num_objectives} finite numbers, of {names}, are allowed, not {list(given)}")
     return tuple(float(value) for value in given)
+
+
+def groups_without_site(env_id: str) -> tuple[str, ...]:
+    """What is observed of a boreal environment, which is registered, but its site parameters."""
+    groups = gym.spec(env_id.split(":")[-1]).kwargs.get("observation_groups") or boreal_env.OBSERVATION_GROUPS
+    return tuple(group for group in groups if group != "site")
 
 
 def name_environment(args) -> str:

@@ -34,7 +34,7 @@ from sim.management import CONIFER_MIXES, DENSITY_CHANGES
 
 NOTHING = str(boreal_env.NO_CHANGE)
 PLUS_100 = "22"  # the paper's: half conifers
-# All actions but those four that do nothing, too.
+# All actions but 10, 11, 13 and 14, which do nothing as 12 does.
 PLANS = (NOTHING, *(str(action) for action in range(25) if not 10 <= action < 15))
 FOLDER = "reference"
 FLOAT_FORMAT = "%.6g"

@@ -141,7 +141,8 @@ class Task:
 
     def shifted(self, shift: str) -> "Task":
         """The same on sites of which one property is outside the sampled range; one of `shifts`."""
-        overrides = {**(self.env_kwargs.get("parameter_overrides") or {}), **SHIFTS[shift]}
+        own = gym.spec(self.env_id.split(":")[-1]).kwargs | self.env_kwargs
+        overrides = {**(own.get("parameter_overrides") or {}), **SHIFTS[shift]}
         return replace(self, env_kwargs={**self.env_kwargs, "parameter_overrides": overrides})
 
     def action_masks(self, envs: gym.vector.VectorEnv, observations: np.ndarray) -> np.ndarray:

@@ -292,16 +292,21 @@ class Reader:
 def in_unit(observations: np.ndarray, name: str, names: Sequence[str] = OBSERVATION_NAMES) -> np.ndarray:
     """One entry of observations with these names, in its own unit again, shape (n,).
 
-    Without names, of all that is observed of two objectives, or of all but the site. Raises ValueError for fewer.
+    Without names, of all that is observed of two objectives, or of all but the site. Raises ValueError for other
+    widths, with names for fewer than they are.
     """
-    least = sum(row.group != "site" for row in OBSERVATION) if names is OBSERVATION_NAMES else len(names)
-    if np.ndim(observations) != 2 or np.shape(observations)[1] < least:
+    width = np.shape(observations)[1] if np.ndim(observations) == 2 else 0
+    if names is OBSERVATION_NAMES:
+        widths = sum(row.group != "site" for row in OBSERVATION), len(names)
+        good, allowed = width in widths, "(n, {}) or (n, {}) is allowed without names".format(*widths)
+    else:
+        good, allowed = width >= len(names), f"(n, {len(names)}) or wider is allowed with these names"
+    if not good:
         raise ValueError(
-            f"observations: shape (n, {least}) or wider is allowed with these names, got {np.shape(observations)}; "
-            "observation[None] makes one of one, and the names of an environment's entries are its observation_names"
+            f"observations: shape {allowed}, got {np.shape(observations)}; observation[None] makes one of one, and the "
+            "names of an environment's entries are its observation_names"
         )
     reader, observations = Reader((name,), names), np.asarray(observations)
-    width = observations.shape[1]
     if reader.columns[0] >= width:
         raise ValueError(f"observations of {width} entries have no {name!r}, which is entry {reader.columns[0]}")
     return reader(observations)[:, 0]
