@@ -173,8 +173,9 @@ def check_kinds(values: dict, kinds: dict) -> None:
             raise TypeError(f"{name} is {values[name]!r}")
 
 
-def read_run(folder: Path) -> Run:
+def read_run(folder: Path | str) -> Run:
     """A run; ValueError says why it cannot be used."""
+    folder = Path(folder)
     config = read_config(folder)
     if (folder / ARCHIVED).exists():
         tables = read_archived(folder)
