@@ -118,9 +118,9 @@ class Described:
 
     _spec: EnvSpec | None = None
 
-    def _describe(self, number: int, arguments: dict, threads: int | None = None) -> None:
-        self._arguments = check_arguments(arguments)
-        self._episodes = Episodes(number, threads=threads, **arguments)
+    def _describe(self, number: int, arguments: dict, own: tuple[str, ...], threads: int | None = None) -> None:
+        self._arguments = check_arguments(arguments, own)
+        self._episodes = Episodes(number, threads=threads, **self._arguments)
         self.mode: str = self._episodes.mode
         self.years: int = self._episodes.years
         self.site_seed: int | None = self._episodes.site_seed
@@ -253,7 +253,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     ## Reset and Step
     `reset(seed=, options={"preference": w, "site": {name: value}})`; seeds are at most 2^63 - 1, here and everywhere.
     `info` is empty but for the last step, where it has the episode's totals (and for `record_steps`). Bad values raise
-    ValueError, a step before reset or after the end RuntimeError (of `gym.make` gymnasium's ResetNeeded).
+    ValueError, a step before reset or after the end RuntimeError (of `gym.make`, before reset, ResetNeeded).
 
     ## Attributes and Methods
     `objective_names`, `reward_dim`, `mode`, `years`, `thaw_formulation`, `site_seed` and `observation_names` are
@@ -281,7 +281,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
             if importlib.util.find_spec("matplotlib") is None:
                 raise gym.error.DependencyNotInstalled('render_mode "rgb_array": pip install matplotlib')
         self.render_mode = render_mode
-        self._describe(1, kwargs)
+        self._describe(1, kwargs, ("render_mode",))
         self.observation_space = self._episodes.observation_space
         self.action_space = Discrete(NUM_ACTIONS)
         self._begun_with: int | None = None  # seed of the last reset, if all of the episode follows from it
@@ -387,7 +387,7 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
             raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
         self.num_envs, self.group_size = int(num_envs), int(group_size)
         try:
-            self._describe(self.num_envs, kwargs, threads)
+            self._describe(self.num_envs, kwargs, ("num_envs", "group_size", "threads"), threads)
         except MemoryError as error:
             raise ValueError(f"num_envs = {num_envs}: fewer are allowed here. {error}") from None
         self.single_observation_space = self._episodes.observation_space
@@ -404,6 +404,9 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
         mask = np.asarray(mask)
         if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
             raise ValueError(f"reset_mask: {self.num_envs} booleans, at least one True, are allowed, got {mask!r}")
+        left = ~(mask | self._episodes.running)
+        if left.any():
+            raise ValueError(f"reset_mask: environment {left.argmax()} has not begun, and has to be among the first")
         weights = spread_weights(options.get("preference"), self.num_envs, self.reward_dim)
         sites = _spread("site", options.get("site"), self.num_envs)
         self._check_groups("site", [check_overrides(site) for site in sites])
@@ -412,12 +415,12 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
             if check_seed("seed", seed) > 2**63 - self.num_envs:
                 raise ValueError(f"seed = {seed}: stand i gets seed + i, so at most 2^63 - {self.num_envs} is allowed")
             seed = [int(seed) + i for i in range(self.num_envs)]
-        seeds = _spread("seed", seed, self.num_envs)
+        seeds = [seed if seed is None else check_seed("seed", seed) for seed in _spread("seed", seed, self.num_envs)]
         if self._generators is None:
             self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
         for i, value in enumerate(seeds):
             if value is not None and mask[i]:
-                self._generators[i] = gym.utils.seeding.np_random(check_seed("seed", value))[0]
+                self._generators[i] = gym.utils.seeding.np_random(value)[0]
         self._begin(np.flatnonzero(mask), weights, sites)
         return self._episodes.observations(), {}
 
@@ -436,11 +439,17 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
             indices = np.flatnonzero(ended)
             for i in map(int, indices):
                 final = {"final_info": self._episodes.final_info(i), "final_obs": observations[i].copy()}
+                if self._episodes.record_steps:
+                    final["final_info"]["record"] = {name: float(column[i]) for name, column in record.items()}
                 infos = self._add_info(infos, final, i)
             nothing = [None] * self.num_envs
             self._begin(indices, nothing, nothing)
             observations = self._episodes.observations()
         return observations, rewards, ended, np.zeros(self.num_envs, bool), infos
+
+    def close_extras(self, **kwargs) -> None:
+        """End the threads."""
+        self._episodes.stands.close()
 
     def action_masks(self) -> np.ndarray:
         """Actions that can be carried out in full, bool, shape (num_envs, 25)."""

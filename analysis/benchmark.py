@@ -28,7 +28,7 @@ import pandas as pd
 import boreal_env
 import sim
 from analysis.machine import machine
-from analysis.paths import make_writable
+from analysis.paths import make_writable, results
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 from cleanrl_style.protocol.hosts import split
@@ -64,8 +64,8 @@ class Args:
     """smaller sizes and fewer repeats, without the compilation: half a minute"""
     repeats: int | None = None
     """repeats of every figure (7; 3 with --quick)"""
-    output_dir: Path = Path("results")
-    """folder for benchmark.csv and benchmark.md"""
+    output_dir: Path | None = None
+    """folder for benchmark.csv and benchmark.md (None: results, with --quick results/quick)"""
 
 
 # ------------------------------------------------------------------------------------------------ what is measured
@@ -408,17 +408,18 @@ def main(args: Args) -> None:
         protocol.fail(f"--only {unknown[0]}: allowed are {', '.join(SECTIONS)}")
     if args.repeats is not None and args.repeats < 1:
         protocol.fail(f"--repeats {args.repeats}: at least 1 is needed")
-    make_writable("--output-dir", args.output_dir)
+    folder = args.output_dir or results(args.quick)
+    make_writable("--output-dir", folder)
     facts = machine()
     protocol.compile_physics(KERNELS)
-    path = args.output_dir / "benchmark.csv"
+    path = folder / "benchmark.csv"
     table = with_earlier(run(args), path)
     text = markdown(facts, table)
     with protocol.replacing(path) as file:
         table.to_csv(file, index=False, float_format=protocol.FLOAT_FORMAT, lineterminator="\n")
-    with protocol.replacing(args.output_dir / "benchmark.md") as file:
+    with protocol.replacing(folder / "benchmark.md") as file:
         file.write(text.encode())
-    print(text + f"\nwrote {args.output_dir}/benchmark.csv and .md")
+    print(text + f"\nwrote {folder}/benchmark.csv and .md")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ import boreal_env
 import sim
 from boreal_env import BALANCED_CARBON_SCALE, BorealEnv, BorealVectorEnv, Objective, Observed, Reward
 from cleanrl_style.flags import fail, parse
+from cleanrl_style.protocol import replacing
 from sim.task.observation import observation_rows
 
 #: Key of the last step's info -> (unit, meaning).
@@ -180,4 +181,5 @@ if __name__ == "__main__":
     args = parse(Args)
     if not args.path.parent.is_dir():
         fail(f"--path {args.path}: there is no folder {args.path.parent}")
-    args.path.write_text(page(), encoding="utf-8")
+    with replacing(args.path) as file:
+        file.write(page().encode())

@@ -176,7 +176,10 @@ class Page:
 
     @reported
     def replay(self, card: StandCard) -> None:
-        """Another manager of one stand, which is played anew as far as it was."""
+        """Another manager of one stand, played anew as far as it was; all stands, if the page shows others."""
+        if self.year.disabled:
+            self.anew(self.alone.played, self.alone.year)
+            return
         card.begin(*card.played(self.alone.setting, self.alone.played))
         self.look(self.alone.year)
 

@@ -30,6 +30,7 @@ import numpy as np
 import pandas as pd
 
 from cleanrl_style.flags import fail, parse
+from cleanrl_style.protocol import replacing
 
 SCENARIOS = ("ssp126", "ssp245", "ssp585")
 REGIONS = ["WSB", "ESB", "NWN"]
@@ -121,6 +122,11 @@ def main(args: Args) -> None:
     if not any(args.atlas.glob("CMIP6_*_historical_*.csv")):
         fail(f"--atlas {args.atlas}: a folder with CMIP6_<model>_historical_<run>.csv is allowed")
     factors = amplification(args.atlas)
+    for scenario in SCENARIOS:
+        if scenario not in factors.index:
+            fail(f"--atlas {args.atlas}: it has no CMIP6_<model>_{scenario}_<run>.csv of a model with the past")
+        if scenario not in ppm.index:
+            fail(f"--concentrations {args.concentrations}: it lacks {scenario}")
     print(factors.round(3).to_string())
     tables = []
     for scenario in SCENARIOS:
@@ -134,7 +140,8 @@ def main(args: Args) -> None:
             "co2_ppm": ppm.loc[scenario, YEARS.astype(str)].to_numpy(float).round(1),
         }
         tables.append(pd.DataFrame(table))
-    FILE.write_text(SOURCE + pd.concat(tables).to_csv(index=False), encoding="utf-8")
+    with replacing(FILE) as file:
+        file.write((SOURCE + pd.concat(tables).to_csv(index=False)).encode())
     print(f"wrote {FILE}")
 
 

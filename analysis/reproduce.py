@@ -30,7 +30,7 @@ from analysis import (
 )
 from cleanrl_style import protocol
 from sim.block import KERNELS
-from sim.executor import HERE, check_address
+from sim.executor import HERE, NoCluster, check_address
 
 Experiment = Literal[tuple(experiments.EXPERIMENTS)]
 
@@ -81,6 +81,8 @@ def finished_configs(*roots: Path) -> list[dict]:
 def main(args: Args) -> None:
     """Run what is not finished, archive it, and make tables, figures and the documents that show results."""
     seeds = None if args.seeds is None else list(args.seeds)
+    if args.quick and seeds is not None:
+        protocol.fail("--seeds is not for --quick, whose runs have seed 1")
     known = {job.flags["seed"] for job in experiments.jobs() if "seed" in job.flags}
     for seed in sorted(set(seeds or ()) - known):
         protocol.fail(f"--seeds {seed}: allowed are {', '.join(map(str, sorted(known)))}")
@@ -120,6 +122,8 @@ def main(args: Args) -> None:
         failed = commands.run_all(waiting, len(jobs), address=args.address)
     except KeyboardInterrupt:
         sys.exit("\nstopped; the same command goes on from here")
+    except NoCluster as error:
+        protocol.fail(f"--{error}")
     archive.archive(runs_dir, archive_dir)
     results = paths.results(args.quick)
     make_tables.main(make_tables.Args(quick=args.quick, tables_dir=results / "tables"))

@@ -261,4 +261,7 @@ class Results:
     def study(self, name: str) -> pd.DataFrame | None:
         """The table of a study; None if it has not been made."""
         path = self.studies_dir / f"{name}.csv"
-        return stored.read(path) if path.exists() else None
+        if not path.exists():
+            return None
+        stored.say_if_of_another_physics(path)
+        return stored.read(path)

@@ -12,6 +12,7 @@ are compiled.
 
 import csv
 import hashlib
+import io
 import json
 import os
 import subprocess
@@ -126,11 +127,13 @@ def main(args: Args) -> None:
     differ = [name for name, hashed in after["of"].items() if before["of"].get(name) != hashed]
     if differ:
         protocol.fail(f"{args.before} has other numbers in: {'; '.join(differ)}. Nothing is noted.")
-    with reference.SAME_PHYSICS.open("w", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(("source", "stands_for", "changed"))
-        if reference.own_source() != before["source"]:
-            table.writerow((reference.own_source(), before["source"], args.changed))
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(("source", "stands_for", "changed"))
+    if reference.own_source() != before["source"]:
+        table.writerow((reference.own_source(), before["source"], args.changed))
+    with protocol.replacing(reference.SAME_PHYSICS) as file:
+        file.write(text.getvalue().encode())
     print(f"all {len(after['of'])} digests are the same: {reference.SAME_PHYSICS} has it")
 
 

@@ -22,7 +22,7 @@ import boreal_env
 import sim
 from analysis.benchmark import started
 from analysis.machine import machine
-from analysis.paths import make_writable
+from analysis.paths import make_writable, results
 from cleanrl_style import protocol
 from sim.draws import streams_of
 from sim.spin_up import SPIN_UP_STEPS_PER_DAY, SPIN_UP_YEARS
@@ -56,8 +56,8 @@ class Args:
     """price of an H100: of an EC2 Capacity Block of p5.48xlarge (Amazon EC2 Capacity Blocks, pricing of 2024)"""
     quick: bool = False
     """16 and 64 stands, an environment of 64, one repeat; of 1024 on a GPU"""
-    output_dir: Path = Path("results")
-    """folder for scaling.csv"""
+    output_dir: Path | None = None
+    """folder for scaling.csv (None: results, with --quick results/quick)"""
 
 
 def repeated(first: sim.Stands, number: int, **kwargs) -> sim.Stands:
@@ -174,9 +174,14 @@ def main(args: Args) -> None:
     if args.quick:
         args.stands, args.environments, args.repeats = (16, 64), 64, 1
         args.gpu_stands, args.gpu_environments = (1024,), 1024
-    make_writable("--output-dir", args.output_dir)
+    for flag in ("stands", "gpu_stands", "threads"):
+        given = getattr(args, flag)
+        if len(set(given)) < len(given):
+            protocol.fail(f"--{flag.replace('_', '-')} {' '.join(map(str, given))}: each once is allowed")
+    folder = args.output_dir or results(args.quick)
+    make_writable("--output-dir", folder)
     table = run(args)
-    with protocol.replacing(args.output_dir / "scaling.csv") as file:
+    with protocol.replacing(folder / "scaling.csv") as file:
         table.to_csv(file, index=False, float_format=protocol.FLOAT_FORMAT, lineterminator="\n")
     print(table.drop(columns="machine").to_string(index=False))
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A sweep as a Slurm job array, a core a task: the arguments of analysis/sweep.py, and as many tasks as one likes.
+# A sweep as a Slurm job array, a core a task: the arguments of analysis/sweep.py, and as many tasks as one likes, 1 to n.
 #
 #     sbatch --array=1-20 analysis/slurm_array.sh cleanrl_style/ppo_group.py --seeds 1-10 --grid learning_rate=1e-4,3e-4
 #
@@ -13,5 +13,8 @@
 #SBATCH --open-mode=append
 set -euo pipefail
 cd "${SLURM_SUBMIT_DIR:-.}"
-first=${SLURM_ARRAY_TASK_MIN:-1}
-exec python analysis/sweep.py "$@" --address none --part "$((SLURM_ARRAY_TASK_ID - first + 1))/$SLURM_ARRAY_TASK_COUNT"
+if [[ $SLURM_ARRAY_TASK_MIN != 1 || $SLURM_ARRAY_TASK_MAX != "$SLURM_ARRAY_TASK_COUNT" ]]; then
+    echo "error: --array=1-n is allowed, whose tasks share the runs; those that are finished are not run again" >&2
+    exit 1
+fi
+exec python analysis/sweep.py "$@" --address none --part "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT"

@@ -1,11 +1,13 @@
 """Tables on disk that know what made them, so that a study that was stopped goes on where it stopped."""
 
 import json
+import sys
+from functools import cache
 from pathlib import Path
 
 import pandas as pd
 
-from cleanrl_style.protocol import FLOAT_FORMAT, replacing
+from cleanrl_style.protocol import FLOAT_FORMAT, reference, replacing
 
 
 def write(path: Path, table: pd.DataFrame, settings: dict) -> None:
@@ -27,6 +29,13 @@ def settings(path: Path) -> dict:
     """The settings that made a table."""
     with path.open(encoding="utf-8") as file:
         return json.loads(file.readline().removeprefix("#"))
+
+
+@cache
+def say_if_of_another_physics(path: Path) -> None:
+    """One line on standard error, once, about a table that was made with another source of the simulator."""
+    if settings(path).get("physics", reference.physics_name()) != reference.physics_name():
+        print(f"{path}: made with another source of the simulator; its command makes it anew", file=sys.stderr)
 
 
 def is_finished(path: Path, settings: dict) -> bool:

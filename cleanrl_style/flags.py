@@ -64,6 +64,8 @@ LIMITS = {
     "kills": (0, 1000),
     "workers": (1, 10**4),
     "environments": (1, 10**6),
+    "gpu_stands": (1, 10**9),
+    "gpu_environments": (1, 10**6),
     "threads": (1, 10**4),
     "repeats": (1, 10**4),
     "dollars_per_core_hour": (0, 10**6),

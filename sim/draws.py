@@ -28,7 +28,7 @@ class Seeds(NamedTuple):
 
 
 def episode_seeds(seed: int) -> Seeds:
-    """Seeds of an episode's start, weather and disturbance, from one integer."""
+    """Seeds of an episode's start, weather and disturbance, from one integer in [0, 2^63); ValueError for another."""
     seed = check_seed("seed", seed)
     return Seeds(*(int(s) for s in np.random.SeedSequence(seed).generate_state(3, np.uint64) >> np.uint64(1)))
 

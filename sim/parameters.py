@@ -139,7 +139,8 @@ def sample_site(site_seed: int, overrides: dict | None = None) -> dict[str, floa
 
 
 def middle_site(overrides: dict | None = None) -> dict[str, float]:
-    """The site in the middle of every range (mean annual temperature: that of its latitude), with overrides."""
+    """The site in the middle of every range (mean annual temperature: that of its latitude), with overrides, in units
+    of `sim/site_parameters.csv`. ValueError names what is no parameter or beyond its limits."""
     overrides = check_overrides(overrides)
     site = {}
     for name, parameter in SITE_PARAMETERS.items():

@@ -74,7 +74,8 @@ def simulate(
         limits of `sim/site_parameters.csv`), or None. All of them, as `sim.sample_site` returns them, are a site too.
         Latitude and climate are the forcing's, where they are not given; a frame that neither `sim.read_forcing` nor
         `sim.half_hours` made does not know its latitude. Beside whole years of forcing nothing acts of what the
-        weather generator takes of the site, such as rain and wind, nor does `weather`.
+        weather generator takes of the site, such as rain and wind, but summer's first and last day, which bound the
+        season of fire; nor does `weather`.
     actions : integer in [0, 25) for every year, or a sequence with one a year; None changes nothing.
     seed : of first state, weather and disturbances.
     years : years to run, at most 5,000; by default those of the forcing, or 50.
@@ -84,7 +85,7 @@ def simulate(
         precipitation_mm [mm per interval]. Whole years of 365 days (29 February is dropped), repeated if there are
         fewer than `years`; or, with years=1, whole days of a part of a year that starts on 1 January, whose ground is
         spun up under generated weather of the site's mean_annual_temperature_c and seasonal_amplitude_c, which have to
-        be given. Intervals finer than the time step are averaged.
+        be given. Intervals finer than the time step are averaged, precipitation summed.
     initial : first stocks by name: density_stems_ha, conifer_fraction, biomass_kgc_m2, soil_kgc_m2,
         conifer_deadwood_kgc_m2, deciduous_deadwood_kgc_m2, hwp_kgc_m2, organic_layer_m, oldest_age_years, or stems by
         class (conifer_mature_stems_ha, ...); the rest is drawn, but for the stems' age, which follows from biomass and
@@ -98,7 +99,8 @@ def simulate(
     boundary : temperature far below: "sampled", the site's; "balanced", that at which no heat flows through it below
         the first stand; or a number [degC]. None: "balanced" with a forcing, unless the site has one, else "sampled".
     scenario : climate change, see `sim.Stands`; not with `forcing`, which is weather of its own.
-    time_step_minutes : a divisor of a day of at most 120 minutes; by default 30, or the forcing's interval if longer.
+    time_step_minutes : a divisor of a day of at most 120 minutes; by default 30, or the least multiple of the forcing's
+        interval from 30 on that divides a day.
     constants, mechanisms, weather, soil_carbon, hwp_half_life_years, harvest_min_class, backend : see `sim.Stands`.
 
     Returns
@@ -124,7 +126,8 @@ def simulate(
             "is allowed"
         )
     if time_step_minutes is None:
-        time_step_minutes = max(DEFAULT_MINUTES, interval)
+        steps = range(interval, 1441, interval)
+        time_step_minutes = next(step for step in steps if step >= DEFAULT_MINUTES and 1440 % step == 0)
     years = _check_years(years, forcing, interval)
     first_year = FIRST_YEAR if forcing is None else int(forcing.index[0].year)
     if output == "xarray" and not DATES[0] <= first_year <= first_year + years - 1 <= DATES[1]:

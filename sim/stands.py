@@ -483,6 +483,12 @@ class Stands:
             self._pool_of = os.getpid()
         return self._pool
 
+    def close(self) -> None:
+        """End the threads, which wait for work; another step begins them anew."""
+        if self._pool is not None and self._pool_of == os.getpid():
+            self._pool.shutdown()
+        self._pool = None
+
     def __getstate__(self) -> dict:
         """What a copy has, or another process: all but the threads."""
         return self.__dict__ | {"_pool": None}
@@ -518,7 +524,7 @@ def yearly_decay(half_life_years) -> float:
     """Share of wood products lost in a year; None is a half-life without end."""
     if half_life_years is None:
         return 0.0
-    number = isinstance(half_life_years, Real) and not isinstance(half_life_years, (bool, np.bool_))
+    number = isinstance(half_life_years, Real) and not isinstance(half_life_years, (bool, np.bool_, np.timedelta64))
     if not number or not 0.1 <= half_life_years <= 1e4:
         raise ValueError(f"hwp_half_life_years: None or a number in [0.1, 10000] is allowed, got {half_life_years!r}")
     return 1.0 - 0.5 ** (1.0 / half_life_years)

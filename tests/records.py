@@ -21,6 +21,17 @@ def measured() -> pd.DataFrame:
     return towers.forcing(towers.read(tower), tower)
 
 
+def remembered(make):
+    """The same record again as a copy, which a test may change; making one takes as long as reading it."""
+    made = functools.cache(make)
+
+    @functools.wraps(make)
+    def copied(*args, **more):
+        return made(*args, **more).copy()
+
+    return copied
+
+
 def _clock(days: int | None) -> tuple[pd.DataFrame, pd.DatetimeIndex]:
     """The weather of the first days of the year, and the starts of its intervals by the clock."""
     weather = measured() if days is None else measured().iloc[: 48 * days]
@@ -31,6 +42,7 @@ def _stamps(times) -> np.ndarray:
     return times.strftime("%Y%m%d%H%M").astype(np.int64).to_numpy()
 
 
+@remembered
 def fluxnet(days: int | None = None) -> pd.DataFrame:
     """FULLSET, half-hourly: consolidated variables with their quality, and some that are not used."""
     weather, start = _clock(days)
@@ -55,6 +67,7 @@ def fluxnet(days: int | None = None) -> pd.DataFrame:
     return table.assign(WD=180.0, RH=-9999, NEE_VUT_REF=-9999, TA_ERA=np.asarray(air) + 1.0)
 
 
+@remembered
 def ameriflux(days: int | None = None) -> pd.DataFrame:
     """BASE, half-hourly: sensors at positions, no longwave, -9999 where nothing was measured."""
     weather, start = _clock(days)
@@ -82,6 +95,7 @@ def with_gaps(table: pd.DataFrame) -> pd.DataFrame:
     return table.drop(index=3000)
 
 
+@remembered
 def icos(days: int | None = None) -> pd.DataFrame:
     """ICOS ETC, level 2, half-hourly."""
     weather, start = _clock(days)
@@ -100,6 +114,7 @@ def icos(days: int | None = None) -> pd.DataFrame:
     )
 
 
+@remembered
 def era5_land(days: int | None = None, since_midnight: bool = True) -> pd.DataFrame:
     """ERA5-Land, hourly by UTC: values at the hour, and sums since midnight (or, as ERA5, of the hour) up to it."""
     weather, start = _clock(days)
@@ -131,6 +146,7 @@ def era5_land(days: int | None = None, since_midnight: bool = True) -> pd.DataFr
     return pd.concat([table, sums], axis=1).rename_axis("valid_time").reset_index()
 
 
+@remembered
 def era5_daily() -> pd.DataFrame:
     """ERA5-Land, daily means and sums."""
     days = measured().groupby(measured().index.normalize())

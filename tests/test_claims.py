@@ -1,3 +1,4 @@
+import functools
 import re
 import shutil
 from itertools import permutations
@@ -59,9 +60,15 @@ def results_of(runs, studies=None, jobs=None):
     return Results((runs,), jobs or experiments.jobs(), studies or runs / "no studies")
 
 
+@functools.cache
+def evidence_of(runs, studies):
+    """Read once for all claims of a test, which writes its runs before it asks for the first."""
+    return Evidence(results_of(runs, studies))
+
+
 def found(claim, runs, studies=None):
     """The finding, and what it says of each quantity."""
-    finding = claims.judge(claim, Evidence(results_of(runs, studies)))
+    finding = claims.judge(claim, evidence_of(runs, studies))
     return finding, {row.what: row.ours for row in finding.rows}
 
 

@@ -30,6 +30,11 @@ BAD_ARGUMENTS = {
     "parameter range reversed": ({"parameter_overrides": {"q10": (2.2, 1.9)}}, r"q10: range reversed, 2.2 > 1.9"),
     "parameters in a list": ({"parameter_overrides": [1]}, r"site parameters: a dict .* got list"),
     "parameters as text": ({"parameter_overrides": "q10"}, r"site parameters: a dict .* got str"),
+    "noise beyond the weather's": (
+        {"weather": "observed", "parameter_overrides": {"daily_noise_std_c": (0.0, 10.0)}},
+        r"daily_noise_std_c = 10: with weather as observed, .* at most 2.54 is allowed",
+    ),
+    "what can be read once": ({"observation_groups": iter(["state"])}, r"observation_groups: .* a list of it is"),
     "unknown range": ({"initial_ranges": {"carbon": (0, 1)}}, r"unknown initial range 'carbon'; allowed: density"),
     "range of one": ({"initial_ranges": {"biomass_kgc_m2": 3}}, r"initial range biomass_kgc_m2: a \(low, high\) pair"),
     "range reversed": ({"initial_ranges": {"biomass_kgc_m2": (3, 1)}}, r"biomass_kgc_m2: reversed, 3 > 1"),

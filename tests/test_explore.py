@@ -3,8 +3,6 @@
 import json
 import re
 import socket
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import gymnasium as gym
@@ -240,6 +238,15 @@ def test_what_is_wrong_is_said_in_one_line_and_no_year_is_played_with_it(page, t
     assert card.stand.played == 2
 
 
+def test_another_stands_change_plays_nothing_that_the_page_does_not_say(page):
+    first, second = page.cards.values()
+    page.forward(1)
+    first.policy.value = "The policy of a run's folder"
+    before = first.stand
+    page.replay(second)
+    assert page.message.visible and page.buttons["A year"].disabled and first.stand is before
+
+
 # ---------------------------------------------------------------------------------------------------------------
 # In a browser
 # ---------------------------------------------------------------------------------------------------------------
@@ -306,7 +313,5 @@ def test_a_port_that_is_taken_is_refused(tmp_path):
         taken.bind(("localhost", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        command = [sys.executable, str(browser.SCRIPT), "--port", str(port), "--no-show"]
-        ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert ended.returncode == 1
-    assert ended.stderr.startswith(f"error: --port {port}:") and ended.stderr.count("\n") == 1
+        with pytest.raises(SystemExit, match=rf"^error: --port {port}: [^\n]*$"):
+            run_script("analysis/explore.py", "--port", port, "--no-show")

@@ -1,5 +1,6 @@
 """Several streams in a worker: to a script, workers with one each."""
 
+import copy
 import os
 import pickle
 import signal
@@ -48,27 +49,36 @@ def assert_same_steps(envs, others, actions=ACTIONS):
             assert_same(one, other)
 
 
-@pytest.mark.parametrize(("cores", "workers"), [(1, 1), (3, 3), (7, 4), (16, 8)])
-def test_a_script_sees_what_it_sees_of_a_worker_each(make, cores, workers):
+SPACES = ("single_observation_space", "single_action_space", "observation_space", "action_space")
+
+
+def seen(envs):
     """Observations, rewards, ends and infos over two episodes, of equal lengths and then of others."""
-    envs, others = make(cores), make(None)
-    assert len(envs.unwrapped.processes) == workers and envs.num_envs == NUMBER
-    for name in ("single_observation_space", "single_action_space", "observation_space", "action_space"):
-        assert getattr(envs, name) == getattr(others, name), name
-    assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
-    seeds = list(range(50, 50 + NUMBER))
-    assert_same(envs.reset(seed=seeds)[0], others.reset(seed=seeds)[0])
-    assert_same(envs.call("action_masks"), others.call("action_masks"))
-    assert_same_steps(envs, others)
+    trace = [envs.reset(seed=list(range(50, 50 + NUMBER)))[0], envs.call("action_masks")]
+    trace += [part for row in ACTIONS for part in envs.step(row)]
     for stream in ([1, 6], [7]):
         mask = np.isin(np.arange(NUMBER), stream)
-        observed, expected = (
-            e.reset(seed=9, options={"preference": 0.5, "reset_mask": mask})[0] for e in (envs, others)
-        )
-        assert_same(observed, expected)
-        assert_same_steps(envs, others, ACTIONS[:3])
-    assert_same(envs.reset(seed=3)[0], others.reset(seed=3)[0])
-    assert_same(envs.reset()[0], others.reset()[0])
+        trace.append(envs.reset(seed=9, options={"preference": 0.5, "reset_mask": mask})[0])
+        trace += [part for row in ACTIONS[:3] for part in envs.step(row)]
+    return [copy.deepcopy(one) for one in (*trace, envs.reset(seed=3)[0], envs.reset()[0])]
+
+
+@pytest.fixture(scope="module")
+def of_a_worker_each():
+    """What is seen by gymnasium alone, and the spaces."""
+    envs = AsyncVectorEnv([TASK.make] * NUMBER, autoreset_mode=AutoresetMode.SAME_STEP)
+    yield seen(envs), [getattr(envs, name) for name in SPACES]
+    envs.close()
+
+
+@pytest.mark.parametrize(("cores", "workers"), [(1, 1), (3, 3), (7, 4), (16, 8)])
+def test_a_script_sees_what_it_sees_of_a_worker_each(make, of_a_worker_each, cores, workers):
+    envs = make(cores)
+    assert len(envs.unwrapped.processes) == workers and envs.num_envs == NUMBER
+    assert [getattr(envs, name) for name in SPACES] == of_a_worker_each[1]
+    assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    for one, other in zip(seen(envs), of_a_worker_each[0], strict=True):
+        assert_same(one, other)
 
 
 @pytest.mark.parametrize("env_id", ["hosted-v0", "settled-v0"])

@@ -256,8 +256,10 @@ def test_an_objective_cannot_rewrite_the_record():
         (lambda: Objective("carbon", timber_revenue), r"objective name 'carbon': an identifier is allowed"),
         (lambda: Objective("my timber", timber_revenue), r"objective name 'my timber': an identifier"),
         (lambda: Objective("timber", 5.0), r"objective timber: a function .* got 5.0"),
-        (lambda: Objective("timber", timber_revenue, 1.0, 0.0), r"objective timber: .* low < high .* \(1.0, 0.0\)"),
+        (lambda: Objective("timber", timber_revenue, 1.0, 0.0), r"objective timber: .* low < high.* \(1.0, 0.0\)"),
         (lambda: Objective("timber", timber_revenue, 0.0, np.inf), r"objective timber: finite limits .* inf"),
+        (lambda: Objective("timber", timber_revenue, -1e39, 1.0), r"at most 1e\+38 either way, are .* got \(-1e\+39"),
+        (lambda: Objective("_timber", timber_revenue), r"objective name '_timber': .* without _ at its front"),
         (
             lambda: play(quick(objectives=(Objective("bad", lambda year: 1.0),)), [12]),
             r"objective bad: an array of 1 finite .* array\(1.\)",

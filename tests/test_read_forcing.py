@@ -1,6 +1,7 @@
 """Records of towers and reanalyses as forcing: each format gives the weather it was made of, what is filled is flagged,
 and what cannot be right is refused in a line that names the row and the column."""
 
+import functools
 import re
 
 import numpy as np
@@ -18,6 +19,18 @@ from sim.state import FORCING
 
 UTC = {name: SWEDEN[name] for name in ("latitude_deg", "longitude_deg")}
 NAMES = list(FORCING)
+
+
+@functools.cache
+def as_it_is():
+    """What the record of `tower` is read as, for all that must be read as the same; nobody changes it."""
+    return sim.read_forcing(tower(), **SWEDEN)
+
+
+@functools.cache
+def year_of_days():
+    """The first year of Poker Flat's days."""
+    return sim.read_forcing(pd.read_csv(records.POKER_FLAT, nrows=365), **ALASKA)
 
 
 def flags(forcing, name):
@@ -146,7 +159,7 @@ def kelvin(table):
 )
 def test_the_units_of_a_datasets_own_attributes_are_those_of_its_values(units, change):
     forcing = sim.read_forcing(dataset(units, change), **SWEDEN)
-    np.testing.assert_allclose(forcing[NAMES], sim.read_forcing(tower(), **SWEDEN)[NAMES], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(forcing[NAMES], as_it_is()[NAMES], rtol=1e-9, atol=1e-9)
 
 
 def test_the_units_of_era5_land_are_known_and_those_of_the_caller_come_first():
@@ -154,7 +167,7 @@ def test_the_units_of_era5_land_are_known_and_those_of_the_caller_come_first():
     forcing = sim.read_forcing(dataset(units, made=records.era5_land), **UTC)
     pd.testing.assert_frame_equal(forcing, sim.read_forcing(records.era5_land(200), **UTC))
     said = sim.read_forcing(dataset({"TA_F": "K"}), units={"TA_F": "degC"}, **SWEDEN)
-    pd.testing.assert_frame_equal(said, sim.read_forcing(tower(), **SWEDEN))
+    pd.testing.assert_frame_equal(said, as_it_is())
 
 
 @pytest.mark.parametrize(
@@ -261,8 +274,7 @@ STAMPS = {
 @pytest.mark.parametrize(("name", "times", "columns"), STAMPS.values(), ids=STAMPS)
 def test_a_day_keeps_its_date_however_it_is_stamped(name, times, columns):
     forcing = sim.read_forcing(days_with(name, times), columns=columns, **ALASKA)
-    expected = sim.read_forcing(pd.read_csv(records.POKER_FLAT, nrows=365), **ALASKA)
-    pd.testing.assert_frame_equal(forcing, expected, check_freq=False)
+    pd.testing.assert_frame_equal(forcing, year_of_days(), check_freq=False)
 
 
 def test_what_solar_time_leaves_of_a_day_repeats_the_day_beside_it(weather):
@@ -364,6 +376,20 @@ def test_gaps_are_filled_by_the_records_own_reanalysis_first():
     np.testing.assert_allclose(forcing.air_temperature_c.iloc[5000:5101], table["TA_ERA"].iloc[5000:5101])
     assert (flags(forcing, "air_temperature_c")[5000:5101] == 7).all()
     assert any("filled here: by the reanalysis" in line for line in forcing.attrs["report"])
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (270.0, r"TA_ERA is 270 degC; \[-75, 50\] degC is allowed"),
+        (30.0, r"TA_F is 30 degC from .* without a change"),
+    ],
+)
+def test_what_a_reanalysis_fills_is_looked_at(value, message):
+    table = records.fluxnet()
+    table.loc[480:980, "TA_F"], table.loc[480:980, "TA_ERA"] = -9999, value  # January
+    with pytest.raises(ValueError, match=message):
+        sim.read_forcing(table, gaps="fill", **SWEDEN)
 
 
 def test_every_flag_has_a_meaning():
@@ -933,7 +959,7 @@ def test_fahrenheit_and_km_an_hour_are_named_where_a_value_is_beyond_its_limits(
 def test_rain_may_be_a_rate(unit, factor):
     rate = tower(lambda t: t.assign(P_F=t.P_F * factor))
     forcing = sim.read_forcing(rate, units={"P_F": unit}, **SWEDEN)
-    np.testing.assert_allclose(forcing.precipitation_mm, sim.read_forcing(tower(), **SWEDEN).precipitation_mm)
+    np.testing.assert_allclose(forcing.precipitation_mm, as_it_is().precipitation_mm)
 
 
 def test_rain_by_the_day_is_refused_of_a_forcing_of_ones_own(weather):

@@ -629,6 +629,11 @@ def test_a_forcing_of_another_interval_is_named_for_what_it_is(monkeypatch, minu
         simulate(forcing=observed(minutes=minutes))
 
 
+def test_by_default_the_step_is_one_that_the_forcing_fills():
+    forcing = observed(minutes=20, precipitation_mm=0.02)
+    pd.testing.assert_frame_equal(sim.simulate(forcing=forcing), sim.simulate(forcing=forcing, time_step_minutes=40))
+
+
 @pytest.mark.parametrize("minutes", [120, 360])
 def test_a_time_step_that_the_forcing_does_not_fill_is_refused(minutes):
     with pytest.raises(ValueError, match=rf"time_step_minutes = {minutes}: the forcing comes every 240 minutes"):

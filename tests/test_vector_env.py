@@ -1,6 +1,7 @@
 """Many stands in lockstep: the same as one by one, groups, resets of a part, refusals."""
 
 import importlib.util
+import threading
 
 import gymnasium as gym
 import numpy as np
@@ -100,6 +101,41 @@ def test_a_partial_reset_restarts_only_what_it_names():
         np.testing.assert_array_equal(after[i], expected[i])
         np.testing.assert_array_equal(rewards[i], expected_rewards[i])
     assert after[1, INDEX["year"]] == np.float32(1 / 50)
+
+
+def test_the_first_reset_is_of_all():
+    envs = quick_vector(3)
+    with pytest.raises(ValueError, match="reset_mask: environment 1 has not begun, and has to be among the first"):
+        envs.reset(seed=1, options={"reset_mask": np.array([True, False, True])})
+
+
+def test_a_refused_seed_leaves_the_others():
+    envs, untouched = quick_vector(2), quick_vector(2)
+    for env in (envs, untouched):
+        env.reset(seed=1)
+    with pytest.raises(ValueError, match="seed: .* got -1"):
+        envs.reset(seed=[77, -1])
+    np.testing.assert_array_equal(envs.reset()[0], untouched.reset()[0])
+
+
+def test_a_years_record_at_an_episodes_end_is_where_gymnasium_has_it():
+    make = [lambda: quick(years=1, record_steps=True)] * 2
+    both = quick_vector(2, years=1, record_steps=True), AsyncVectorEnv(make, autoreset_mode=AutoresetMode.SAME_STEP)
+    found = []
+    for envs in both:
+        envs.reset(seed=1)
+        found.append(envs.step(np.array([24, 12]))[4]["final_info"]["record"])
+        envs.close()
+    assert_same(*found)
+
+
+def test_threads_end_when_it_is_closed():
+    envs = quick_vector(20, threads=2)
+    before = threading.active_count()
+    envs.reset(seed=1)
+    envs.step(np.full(20, 12))
+    envs.close()
+    assert threading.active_count() == before
 
 
 def test_a_group_shares_site_and_weather_in_every_episode_not_the_preference():

@@ -10,6 +10,7 @@ Leaves results/studies/boreal_map.csv, a row a point, and docs/images/boreal_map
 runs/boreal_map, and the same command goes on where it was killed.
 """
 
+import hashlib
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from analysis import paths, stored
 from analysis.methods import STRATEGIES
 from baselines_heuristic import obeying
 from cleanrl_style import protocol
+from cleanrl_style.protocol.agents import policy_file
 from sim.executor import HERE
 from sim.management import decode
 
@@ -77,6 +79,13 @@ def policy_of(args: Args) -> tuple[str, str, Callable]:
     return f"{policy.script}-seed{policy.arguments['seed']}", args.env_id or policy.env_id, policy
 
 
+def store_of(args: Args, name: str) -> str:
+    """Name of a policy's store; trained ones of equal names are told apart by their files."""
+    if args.policy in STRATEGIES:
+        return name
+    return f"{name}-{hashlib.sha256(policy_file(args.policy).read_bytes()).hexdigest()[:8]}"
+
+
 def outlines() -> list[np.ndarray]:
     """Coastlines, each (points, 2) of longitude and latitude [deg]; one that crosses 180 degrees goes on beyond it."""
     rings = [ring for _, ring in pd.read_csv(LAND).groupby("ring")]
@@ -110,7 +119,7 @@ def sites(args: Args) -> pd.DataFrame:
     return table[on_land(table.longitude_deg, table.latitude_deg)].reset_index(drop=True)
 
 
-def study(args: Args, name: str, world: dict, policy: Callable, folder: Path) -> pd.DataFrame:
+def study(args: Args, store: str, env_id: str, world: dict, policy: Callable, folder: Path) -> pd.DataFrame:
     """A row a point: what was planted there [stems ha-1 yr-1], the share of conifers in it, and thaw depth [m] and
     carbon [kgC m-2] at the end, less those without the policy."""
     shared = {
@@ -123,10 +132,10 @@ def study(args: Args, name: str, world: dict, policy: Callable, folder: Path) ->
         **world,
     }
     climate = args.climate.stem if args.climate else "latitude"
-    where = f"{args.spacing:g}deg-{args.years}years-{args.env_id}-{climate}.zarr"
+    where = f"{args.spacing:g}deg-{args.years}years-{env_id}-{climate}.zarr"
     places = sites(args)
     print(f"{len(places):,} stands, with the policy and without", flush=True)
-    acted = sim.simulate_many(places, policy, path=folder / f"{name}-{args.preference:g}-{where}", **shared)
+    acted = sim.simulate_many(places, policy, path=folder / f"{store}-{args.preference:g}-{where}", **shared)
     left = sim.simulate_many(places, path=folder / f"nothing-{args.preference:g}-{where}", **shared)
     planted = acted.planted_stems_ha.to_numpy().astype(float)
     conifers = (planted * decode(acted.action.to_numpy())[1]).sum(axis=1)
@@ -222,7 +231,8 @@ def draw(table: pd.DataFrame, spacing: float, title: str, path: Path) -> None:
     grid[1, 0].set_ylabel("median, and\n80 % of the stands")
     figure.suptitle(title, fontsize=11)
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=150, metadata={"Software": None})
+    with protocol.replacing(path) as file:
+        figure.savefig(file, format="png", dpi=150, metadata={"Software": None})
     plt.close(figure)
 
 
@@ -261,7 +271,8 @@ def main(args: Args) -> None:
         protocol.fail(f"--env-id {env_id}: it is of one site; a generalist's is allowed")
     world = {key: value for key, value in gym.spec(env_id).kwargs.items() if key != "mode"}
     try:
-        table = study(args, name, world, policy, paths.runs(args.quick) / "boreal_map")
+        folder = paths.runs(args.quick) / "boreal_map"
+        table = study(args, store_of(args, name), env_id, world, policy, folder)
     except ValueError as error:  # of a climate file, or of an address
         protocol.fail(str(error))
     settings = {

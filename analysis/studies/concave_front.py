@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from analysis import paths, stored
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts, reference
-from cleanrl_style.protocol.arguments import ideal_point
+from cleanrl_style.protocol.arguments import ask, ideal_point
 from cleanrl_style.protocol.utility import LINEAR, Chebyshev, Utility
 
 SITE = 1037049714
@@ -96,6 +96,9 @@ NAMES = {"linear": "weighted sum", "chebyshev": "Chebyshev's utility"}
 def main(args: Args) -> None:
     """Play, or take what was played before; write the table and the picture."""
     paths.make_writable("--path", args.path.parent)
+    task = ask(args.env_id)
+    if not task.boreal:
+        protocol.fail(f"--env-id {args.env_id}: a boreal environment is allowed")
     task = protocol.Task.of(args.env_id, site_seed=args.site_seed)
     if task.num_objectives != 2:
         protocol.fail(f"--env-id {args.env_id}: an environment of two objectives is allowed")

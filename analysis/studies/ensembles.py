@@ -89,7 +89,8 @@ def main(args: Args) -> None:
         policies = {seed: protocol.load_policy(file.parent) for seed, file in files.items()}
         seeds, number = list(policies), len(policies)
         task = policies[seeds[0]].task()
-        for size in (number,) if args.quick else (2, number // 2, number):  # single seeds are the main table's
+        sizes = {number} if args.quick else {2, number // 2, number} - {1}  # single seeds are the main table's
+        for size in sorted(sizes):
             for chosen in sets_of(seeds, size):
                 print(f"{task_id}: seeds {', '.join(map(str, chosen))}", flush=True)
                 gained = gains_of([policies[seed] for seed in chosen], task, episodes)

@@ -345,6 +345,7 @@ def main(args: Args) -> None:
         return
 
     make_writable("--output-dir", args.output_dir)
+    make_writable("--document", args.document.parent)
     settings = {
         "sites": site_seeds,
         "weathers": WEATHERS,

@@ -6,6 +6,7 @@ Reads the training episodes of the curriculum's runs, draws some of both kinds f
 alone for 50 years. Leaves results/studies/site_warming.csv, one row a drawn episode.
 """
 
+import hashlib
 import sys
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ import pandas as pd
 import boreal_env
 import sim
 from analysis import results, stored
+from analysis.reduction import as_text
 from analysis.studies import open_loop
 from cleanrl_style import protocol
 from cleanrl_style.protocol import reference
@@ -65,6 +67,12 @@ def study(curricula: list[results.Replicate], each: int, years: int) -> pd.DataF
     return pd.concat(tables, ignore_index=True)
 
 
+def digest(curricula: list[results.Replicate]) -> str:
+    """Hash of the training episodes that are drawn from."""
+    texts = [as_text("sample", curriculum.runs[0].tables["sample"]) for curriculum in curricula]
+    return hashlib.sha256("".join(texts).encode()).hexdigest()[:16]
+
+
 def main(args: Args) -> None:
     """Play the drawn sites, unless the table is there."""
     found = results.Results.load(args.quick, here=True)
@@ -75,7 +83,13 @@ def main(args: Args) -> None:
     each, years = (2, 5) if args.quick else (EACH, YEARS)
     path = found.studies_dir / "site_warming.csv"
     seeds = [curriculum.runs[0].arguments["seed"] for curriculum in curricula]
-    settings = {"seeds": seeds, "each": each, "years": years, "physics": reference.physics_name()}
+    settings = {
+        "seeds": seeds,
+        "each": each,
+        "years": years,
+        "physics": reference.physics_name(),
+        "samples": digest(curricula),
+    }
     if stored.is_finished(path, settings):
         print(f"{path} is finished")
         return

@@ -417,7 +417,8 @@ def draw(plans: pd.DataFrame, years: pd.DataFrame, path: Path) -> None:
     for axes in (left, right):
         axes.spines[["top", "right"]].set_visible(False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=150, metadata={"Software": None})
+    with protocol.replacing(path) as file:
+        figure.savefig(file, format="png", dpi=150, metadata={"Software": None})
     plt.close(figure)
 
 
@@ -443,7 +444,8 @@ def main(args: Args) -> None:
         print(f"{PAGE} is of {Args.sites} sites and stays as it is")
     else:
         of_plans, of_years = (stored.read(path) for path in tables)
-        PAGE.write_text(page(of_plans, of_years), encoding="utf-8")
+        with protocol.replacing(PAGE) as file:
+            file.write(page(of_plans, of_years).encode())
         draw(of_plans, of_years, FIGURE)
         print(f"wrote {PAGE} and {FIGURE}")
 

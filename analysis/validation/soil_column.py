@@ -297,7 +297,8 @@ def main(args: Args) -> None:
         print(f"\n{markdown(table)}")
     steps = steps[[*QUANTITIES.values()]]
     for name, table in {"schemes": schemes, "time_steps": steps, "boundary_depths": depths}.items():
-        table.to_csv(args.output_dir / f"{name}.csv", float_format="%.6g", lineterminator="\n")
+        with protocol.replacing(args.output_dir / f"{name}.csv") as file:
+            table.to_csv(file, float_format="%.6g", lineterminator="\n")
 
 
 if __name__ == "__main__":

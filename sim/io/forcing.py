@@ -1,6 +1,7 @@
 """Forcing of the simulator from a tower's or a reanalysis' own file."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -78,10 +79,10 @@ def read_forcing(
         towers, unless they are daily. Times with a time zone are converted by it; days keep their dates.
     years : first and last year to use, or one; all by default. The result has whole years of 365 days, from 1 January
         (29 February is dropped), or a part of one year.
-    gaps : "refuse" raises at the first; "fill" fills those of up to `longest_gap_days` days and flags them: by the
-        reanalysis column that the record has beside it, on a straight line over three hours, as the mean of the same
-        time of day in the weeks around (Falge et al. 2001); longwave of more than three hours, however many, by
-        temperature, humidity and sunlight.
+    gaps : "refuse" raises at the first; "fill" fills and flags them: by the reanalysis column that the record has
+        beside it, however long; else, up to `longest_gap_days` days, on a straight line over three hours, as the mean
+        of the same time of day in the weeks around (Falge et al. 2001); longwave of more than three hours, however
+        many, by temperature, humidity and sunlight.
     columns : names of your own: {"air_temperature": "Tair", "time_start": "begin", ..}. Times are "time_start",
         "time_end" or "time_middle" of their intervals, or the "time" of a reanalysis or a day.
     units : of columns whose unit is not the usual one, or not known: {"Tair": "K"}. It overrules the attribute `units`
@@ -158,7 +159,8 @@ def read_forcing(
     wanted = _whole_days(table, record.index, interval, years)
     record, flags, row_of = record.reindex(wanted), flags.reindex(wanted), row_of.reindex(wanted)
     taken = []
-    for line in unusual_lines(table.name, record, choice.columns, latitude_deg, interval, _relative_humidity):
+    seen = _completed(record) if gaps == "fill" else record
+    for line in unusual_lines(table.name, seen, choice.columns, latitude_deg, interval, _relative_humidity):
         if unusual == "refuse":
             raise ValueError(f"{line}; unusual='take' takes it as it is")
         taken.append(line)
@@ -302,6 +304,8 @@ def _values(table: Table, rows: pd.DataFrame, choice: Choice, times: pd.Datetime
             flag = np.where(filled, BY_SOURCE, flag)
         if column.reanalysis:
             beside = column.converted(table.numbers(rows[column.reanalysis], column.reanalysis), seconds)
+            used = np.where(np.isnan(values), beside, np.nan)
+            _check_limits(table, times, replace(column, name=column.reanalysis), used, seconds)
             record[f"{quantity}_beside"] = pd.Series(beside, index=times).reindex(index)
         if not (summed and quantity in reanalysis.ACCUMULATED):
             _check_limits(table, times, column, values, seconds)
@@ -367,8 +371,16 @@ def _derived(record: pd.DataFrame, choice: Choice, flags: pd.DataFrame) -> pd.Da
             flags.loc[np.abs(limited - humidity) > 1e-3, name] = LIMITED
     for name in ("shortwave", "precipitation"):
         flags.loc[record[name] < -ROUND_OFF[name], name] = LIMITED
-        record[name] = record[name].clip(lower=0.0)
+        for one in (name, f"{name}_beside"):
+            if one in record:
+                record[one] = record[one].clip(lower=0.0)
     return record
+
+
+def _completed(record: pd.DataFrame) -> pd.DataFrame:
+    """The record with its gaps filled by what a reanalysis has beside it."""
+    beside = {name: record[f"{name}_beside"] for name in OURS if f"{name}_beside" in record}
+    return record.assign(**{name: record[name].fillna(values) for name, values in beside.items()})
 
 
 # ------------------------------------------------------------------------------------------------- years and gaps

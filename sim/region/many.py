@@ -22,7 +22,7 @@ from sim.executor import HERE, check_address, each
 from sim.management import NUM_ACTIONS, as_array, check_actions
 from sim.parameters import check_name
 from sim.region.plan import Plan
-from sim.region.site_table import SEED, check_sites
+from sim.region.site_table import SEED, check_noise_of, check_sites
 from sim.region.store import Store, code_of, digest, name_of
 from sim.spin_up import BOUNDARY, INITIAL_LIMITS
 from sim.stands import check_threads
@@ -116,6 +116,7 @@ def simulate_many(
     check_address(address)
     table = check_sites(sites, others, seed)
     one = check_world(years, threads, arguments, table)
+    check_noise_of(table, sites.index, one.stands)
     chosen, label = check_choice(actions, label, len(table), one)
     tell_of_training(actions, arguments)
     size = chunk_size(len(table), one.years)

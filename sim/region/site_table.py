@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 import sim
-from sim.parameters import check_name, check_seed
+from sim.parameters import check_name, check_noise, check_seed
 from sim.spin_up import INITIAL_LIMITS, check_initial, most_biomass
 
 OTHERS = ("middle", "sampled")
@@ -80,6 +80,18 @@ def check_biomass(table: pd.DataFrame, index: pd.Index) -> None:
             f"sites: {row_of(index, k)}, column {BIOMASS} is {table[BIOMASS].iloc[k]:g}; of {stems.iloc[k]:g} stems/ha "
             f"at most {most.iloc[k]:.4g} kgC/m2 is allowed"
         )
+
+
+def check_noise_of(table: pd.DataFrame, index: pd.Index, stands: sim.Stands) -> None:
+    """Refuse a swing of temperature that is too much with the weather of these stands."""
+    name = "daily_noise_std_c"
+    if name not in table:
+        return
+    k = int(table[name].argmax())
+    try:
+        check_noise({name: float(table[name].iloc[k]), **stands.constants, **stands.weather})
+    except ValueError as error:
+        raise ValueError(f"sites: {row_of(index, k)}, column {error}") from None
 
 
 def check_column(column: pd.Series, low: float, high: float, unit: str) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Episodes side by side: what the environment of one stand and that of many in lockstep share."""
 
+import copy
 import inspect
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
 import numpy as np
@@ -9,7 +10,7 @@ from gymnasium.spaces import Box
 
 import sim
 from sim.management import check_actions
-from sim.parameters import check_name, check_overrides, check_seed, is_integer
+from sim.parameters import check_name, check_noise, check_overrides, check_seed, is_integer
 from sim.saved import check_array, check_keys, check_settings
 from sim.spin_up import BOUNDARY, check_initial_ranges, middle_stocks
 from sim.task.actions import MaskFunction, mask_function, unchanged
@@ -118,6 +119,10 @@ class Episodes:
         )
         if self.stands.scenario is not None:
             self.stands.scenario.check_years(self.years)
+        noise = "daily_noise_std_c"
+        if noise in self.parameter_overrides:
+            most = {noise: check_overrides(self.parameter_overrides)[noise][1]}
+            check_noise({**most, **self.stands.constants, **self.stands.weather})
         self._choose_observation(observation_groups)
 
         self.weights = np.zeros((number, len(objectives)))
@@ -178,8 +183,8 @@ class Episodes:
             if self.stands.boundary == "balanced" and BOUNDARY in (site or ()) and len(site) < len(sim.SITE_PARAMETERS):
                 raise ValueError(f"site: {BOUNDARY}: boundary='balanced' finds it; a value of your own is not allowed")
         chosen, seeds, given = [], [], dict(initial or {})
-        for k, i in enumerate(indices):
-            site_seed, episode_seed, weights = draws[k]
+        names, numbers, all_weights = [], [], []
+        for k, (site_seed, episode_seed, weights) in enumerate(draws):
             overrides = {**self.parameter_overrides, **(sites[k] or {})}
             if self.mode == "site-specific":
                 # A fixed world: one site, one start, one weather, one set of disturbance dice.
@@ -191,11 +196,13 @@ class Episodes:
             fixed_middle = self.mode == "site-specific" and self.site_seed is None
             chosen.append(sim.middle_site(overrides) if fixed_middle else sim.sample_site(site_seed, overrides))
             seeds.append(sim.episode_seeds(episode_seed))
-            self.site_seeds[i] = -1 if fixed_middle else site_seed
-            self.episode_seeds[i] = episode_seed
+            names.append(-1 if fixed_middle else site_seed)
+            numbers.append(episode_seed)
             wanted = self.fixed_weights if preferences[k] is None else preferences[k]
-            self.weights[i] = weights if wanted is None else wanted
+            all_weights.append(weights if wanted is None else wanted)
+        self.running[indices] = False  # till they have started: after an error, reset
         self.stands.start(indices, chosen, seeds, given, self.initial_ranges)
+        self.site_seeds[indices], self.episode_seeds[indices], self.weights[indices] = names, numbers, all_weights
         self.year[indices] = 0
         self.running[indices] = True
         self.history[indices] = 0.0
@@ -372,9 +379,11 @@ def check_saved(state: dict, kind: str) -> None:
 ARGUMENTS = tuple(name for name in inspect.signature(Episodes).parameters if name not in ("number", "threads"))
 
 
-def check_arguments(arguments: dict) -> dict:
-    """Arguments of an environment, all of which it has."""
-    for name in arguments:
+def check_arguments(arguments: dict, own: tuple[str, ...] = ()) -> dict:
+    """A copy of an environment's arguments, all of which it has; own : those that it has beside these."""
+    for name, value in arguments.items():
         if name not in ARGUMENTS:
-            raise ValueError(f"unknown argument {name!r}; allowed: {', '.join(ARGUMENTS)}, render_mode")
-    return arguments
+            raise ValueError(f"unknown argument {name!r}; allowed: {', '.join((*ARGUMENTS, *own))}")
+        if isinstance(value, Iterator):
+            raise ValueError(f"{name}: what can be read once, {value!r}, is not allowed; a list of it is")
+    return copy.deepcopy(arguments)

@@ -173,6 +173,9 @@ HISTORY_NAMES = (*sim.RECORD_NAMES, *REWARD_COLUMNS)
 PAPER_OBJECTIVES = ("carbon", "thaw")
 
 
+MOST_REWARD = 1e38  # that float32 holds
+
+
 @dataclass(frozen=True)
 class Objective:
     """An objective of your own, beside the paper's "carbon" and "thaw".
@@ -191,13 +194,16 @@ class Objective:
 
     def __post_init__(self):
         taken = (*PAPER_OBJECTIVES, "components", "scalarized")
-        if not isinstance(self.name, str) or not self.name.isidentifier() or self.name in taken:
-            raise ValueError(f"objective name {self.name!r}: an identifier is allowed, not {', '.join(taken)}")
+        # gymnasium's infos have a mask `_<name>` beside every name
+        if not isinstance(self.name, str) or not self.name.isidentifier() or self.name in taken or self.name[0] == "_":
+            allowed = f"an identifier is allowed, without _ at its front, not {', '.join(taken)}"
+            raise ValueError(f"objective name {self.name!r}: {allowed}")
         if not callable(self.value):
             raise ValueError(f"objective {self.name}: a function of the year's record is allowed, got {self.value!r}")
         limits = (self.low, self.high)
-        if not all(isinstance(x, Real) and np.isfinite(x) for x in limits) or self.low >= self.high:
-            raise ValueError(f"objective {self.name}: finite limits low < high are allowed, got {limits}")
+        if not all(isinstance(x, Real) and abs(x) <= MOST_REWARD for x in limits) or self.low >= self.high:
+            allowed = f"finite limits low < high, at most {MOST_REWARD:g} either way, are allowed"
+            raise ValueError(f"objective {self.name}: {allowed}, got {limits}")
 
     def columns(self, year: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """`<name>_clipped` and `<name>_reward` of a year, each shape (n,)."""

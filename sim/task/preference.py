@@ -5,6 +5,7 @@ options, in the observation and in the last step's info.
 """
 
 from collections.abc import Iterator
+from numbers import Real
 
 import numpy as np
 import pandas as pd
@@ -73,7 +74,7 @@ def shown(weights: np.ndarray):
 
 
 def _is_number(value) -> bool:
-    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+    return isinstance(value, Real) and not isinstance(value, (bool, np.bool_, np.timedelta64))
 
 
 def _refuse_labels(value, what: str) -> None:
