@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A sweep as a Slurm job array, a core a task: the arguments of analysis/sweep.py, and as many tasks as one likes, 1 to n.
+# A sweep as a Slurm job array, a core a task: the arguments of analysis/sweep.py, and as many tasks as one likes, without gaps.
 #
 #     sbatch --array=1-20 analysis/slurm_array.sh cleanrl_style/ppo_group.py --seeds 1-10 --grid learning_rate=1e-4,3e-4
 #
@@ -13,8 +13,9 @@
 #SBATCH --open-mode=append
 set -euo pipefail
 cd "${SLURM_SUBMIT_DIR:-.}"
-if [[ $SLURM_ARRAY_TASK_MIN != 1 || $SLURM_ARRAY_TASK_MAX != "$SLURM_ARRAY_TASK_COUNT" ]]; then
-    echo "error: --array=1-n is allowed, whose tasks share the runs; those that are finished are not run again" >&2
+if ((SLURM_ARRAY_TASK_MAX - SLURM_ARRAY_TASK_MIN + 1 != SLURM_ARRAY_TASK_COUNT)); then
+    echo "error: --array without gaps is allowed, such as 1-20, whose tasks share the runs that are not finished" >&2
     exit 1
 fi
-exec python analysis/sweep.py "$@" --address none --part "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT"
+part=$((SLURM_ARRAY_TASK_ID - SLURM_ARRAY_TASK_MIN + 1))
+exec python analysis/sweep.py "$@" --address none --part "$part/$SLURM_ARRAY_TASK_COUNT"

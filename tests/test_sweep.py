@@ -133,11 +133,17 @@ def test_a_slurm_array_is_its_parts(tmp_path):
     fake = tmp_path / "python"
     fake.write_text('#!/bin/sh\necho "$@"\n')
     fake.chmod(0o755)
-    array = {"SLURM_ARRAY_TASK_ID": "4", "SLURM_ARRAY_TASK_MIN": "2", "SLURM_ARRAY_TASK_COUNT": "10"}
-    environment = {**os.environ, **array, "SLURM_SUBMIT_DIR": str(tmp_path), "PATH": f"{tmp_path}:{os.environ['PATH']}"}
-    words = [shutil.which("bash"), ROOT / "analysis" / "slurm_array.sh", "a script.py", "--seeds", "1-10"]
-    answer = subprocess.run(words, env=environment, capture_output=True, text=True, check=True).stdout
-    assert answer == "analysis/sweep.py a script.py --seeds 1-10 --address none --part 3/10\n"
+
+    def answer(first, last, number):
+        array = dict(ID=4, MIN=first, MAX=last, COUNT=number)
+        array = {f"SLURM_ARRAY_TASK_{name}": str(value) for name, value in array.items()}
+        array |= {"SLURM_SUBMIT_DIR": str(tmp_path), "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+        words = [shutil.which("bash"), ROOT / "analysis" / "slurm_array.sh", "a script.py", "--seeds", "1-10"]
+        return subprocess.run(words, env={**os.environ, **array}, capture_output=True, text=True)
+
+    assert answer(2, 11, 10).stdout == "analysis/sweep.py a script.py --seeds 1-10 --address none --part 3/10\n"
+    with_gaps = answer(4, 7, 2)
+    assert with_gaps.returncode == 1 and with_gaps.stderr.startswith("error: --array without gaps is allowed")
 
 
 @pytest.mark.parametrize(
