@@ -21,3 +21,8 @@ def test_the_middle_is_chebyshev_s_alone(monkeypatch):
     figure = concave_front.draw(front, choices, "three plans")
     left, right = figure.axes
     assert len(left.texts) == 3 and len(right.lines) == 2
+
+
+def test_another_environment_is_refused(tmp_path):
+    with pytest.raises(SystemExit, match="--env-id toy_env:toy-v0: a boreal environment is allowed"):
+        concave_front.main(concave_front.Args(env_id="toy_env:toy-v0", path=tmp_path / "front.png"))

@@ -701,3 +701,14 @@ def test_the_committed_tables_are_of_the_committed_runs():
         env_id, version, setting = path.name.partition("-v0")
         key = path.parent.name, env_id + version, frozenset(setting.removeprefix("-").split("-"))
         assert made.get(key) == len(list(path.glob("seed*"))), f"{key}: make_tables.py, as results/README.md says"
+
+
+def test_a_study_of_another_simulator_is_named_once(tmp_path, capsys):
+    for name, physics in (("mine", physics_name()), ("other", "another"), ("unsaid", None)):
+        settings = {"physics": physics} if physics else {}
+        stored.write(tmp_path / f"{name}.csv", pd.DataFrame({"value": [1.0]}), settings)
+        for _ in range(2):
+            assert Results((), experiments.jobs(), tmp_path).study(name).value.tolist() == [1.0]
+    assert capsys.readouterr().err.splitlines() == [
+        f"{tmp_path / 'other.csv'}: made with another source of the simulator; its command makes it anew"
+    ]

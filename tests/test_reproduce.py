@@ -128,6 +128,11 @@ def test_a_seed_that_no_experiment_has_is_refused():
         run_script("analysis/reproduce.py", "--list", "--seeds", "99")
 
 
+def test_quick_runs_have_one_seed():
+    with pytest.raises(SystemExit, match="--seeds is not for --quick, whose runs have seed 1"):
+        reproduce.main(reproduce.Args(quick=True, seeds=(7,)))
+
+
 def test_what_trains_nothing_can_be_run_alone(capsys):
     run_script("analysis/reproduce.py", "--list", "--only", "main", "balanced", "--untrained")
     strategies = [f"python baselines_heuristic/{script}.py" for script in methods.STRATEGIES]

@@ -4,6 +4,7 @@ business."""
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 from scripts import ROOT
 
@@ -57,3 +58,16 @@ def test_the_pages_python_runs(tmp_path, monkeypatch):
     exec(compile(code, "docs/scaling.md", "exec"), names)
     assert names["thaw"].shape == (3, 2) and names["thaw"].gt(0).all(axis=None)
     assert (tmp_path / "region.zarr").is_dir() and (tmp_path / "planted.zarr").is_dir()
+
+
+def test_a_number_that_is_named_twice_is_refused(tmp_path):
+    with pytest.raises(SystemExit, match="--stands 4 4: each once is allowed"):
+        scaling.main(scaling.Args(stands=(4, 4), output_dir=tmp_path))
+
+
+def test_what_is_quick_is_not_written_over_what_is_committed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(scaling, "run", lambda args: pd.DataFrame({"machine": ["this"], "median": [1.0]}))
+    scaling.main(scaling.Args(quick=True))
+    assert [path.name for path in tmp_path.rglob("*.csv")] == ["scaling.csv"]
+    assert (tmp_path / "results" / "quick" / "scaling.csv").exists()
