@@ -2,6 +2,7 @@
 
 import gc
 import pickle
+import threading
 import tracemalloc
 import warnings
 from functools import partial
@@ -181,6 +182,23 @@ def test_an_environment_says_what_it_is():
         assert (one.mode, one.years, one.site_seed, one.thaw_formulation) == ("site-specific", 7, 5, "contrast")
         assert (one.objective_names, one.reward_dim) == (("carbon", "thaw", "timber"), 3)
         assert one.observation_names[:3] == ("preference_carbon", "preference_thaw", "year")
+
+
+def test_arguments_are_those_that_were_given_whatever_becomes_of_them():
+    class Counted:
+        def __init__(self):
+            self.lock = threading.Lock()  # which nothing can copy
+
+        def of(self, year):
+            return year["harvest_kgc_m2"]
+
+    overrides, groups, counted = {"q10": [1.9, 2.0]}, ["preference", "site"], Counted()
+    objectives = ["carbon", boreal_env.Objective("harvest", counted.of)]
+    env = quick(parameter_overrides=overrides, observation_groups=groups, objectives=objectives)
+    before = env.reset(seed=1)[0]
+    overrides["q10"][:], groups[:], objectives[:] = [2.2, 2.3], ["climate"], ["thaw"]
+    np.testing.assert_array_equal(env.reset(seed=1)[0], before)
+    np.testing.assert_array_equal(env.lockstep(1).reset(seed=1)[0][0], before)
 
 
 def test_lockstep_has_the_same_arguments_but_for_the_changes():

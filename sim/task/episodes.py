@@ -1,11 +1,11 @@
 """Episodes side by side: what the environment of one stand and that of many in lockstep share."""
 
-import copy
 import inspect
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
 import numpy as np
+import pandas as pd
 from gymnasium.spaces import Box
 
 import sim
@@ -386,4 +386,13 @@ def check_arguments(arguments: dict, own: tuple[str, ...] = ()) -> dict:
             raise ValueError(f"unknown argument {name!r}; allowed: {', '.join((*ARGUMENTS, *own))}")
         if isinstance(value, Iterator):
             raise ValueError(f"{name}: what can be read once, {value!r}, is not allowed; a list of it is")
-    return copy.deepcopy(arguments)
+    return copied(arguments)
+
+
+def copied(value):
+    """Plain containers and tables anew, so that whoever gave them may change them; a function, say, as it is."""
+    if type(value) is dict:
+        return {name: copied(one) for name, one in value.items()}
+    if type(value) in (list, tuple):
+        return type(value)(map(copied, value))
+    return value.copy() if isinstance(value, (np.ndarray, pd.DataFrame, pd.Series)) else value
