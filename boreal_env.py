@@ -209,7 +209,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     After 50 years the episode is terminated: nothing is worth anything beyond.
 
     ## Arguments
-    - `mode`: "generalist" (unless `gym.make` has another id) or "site-specific"
+    - `mode`: "generalist", which it is unless said, or "site-specific"
     - `years`: length of an episode (50)
     - `time_step_minutes`: a divisor of 1440, at most 120 (30)
     - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (a GPU, for thousands)
