@@ -183,7 +183,7 @@ class Episodes:
             if self.stands.boundary == "balanced" and BOUNDARY in (site or ()) and len(site) < len(sim.SITE_PARAMETERS):
                 raise ValueError(f"site: {BOUNDARY}: boundary='balanced' finds it; a value of your own is not allowed")
         chosen, seeds, given = [], [], dict(initial or {})
-        names, numbers, all_weights = [], [], []
+        site_seeds, episode_seeds, all_weights = [], [], []
         for k, (site_seed, episode_seed, weights) in enumerate(draws):
             overrides = {**self.parameter_overrides, **(sites[k] or {})}
             if self.mode == "site-specific":
@@ -196,13 +196,14 @@ class Episodes:
             fixed_middle = self.mode == "site-specific" and self.site_seed is None
             chosen.append(sim.middle_site(overrides) if fixed_middle else sim.sample_site(site_seed, overrides))
             seeds.append(sim.episode_seeds(episode_seed))
-            names.append(-1 if fixed_middle else site_seed)
-            numbers.append(episode_seed)
+            site_seeds.append(-1 if fixed_middle else site_seed)
+            episode_seeds.append(episode_seed)
             wanted = self.fixed_weights if preferences[k] is None else preferences[k]
             all_weights.append(weights if wanted is None else wanted)
         self.running[indices] = False  # till they have started: after an error, reset
         self.stands.start(indices, chosen, seeds, given, self.initial_ranges)
-        self.site_seeds[indices], self.episode_seeds[indices], self.weights[indices] = names, numbers, all_weights
+        self.site_seeds[indices], self.episode_seeds[indices] = site_seeds, episode_seeds
+        self.weights[indices] = all_weights
         self.year[indices] = 0
         self.running[indices] = True
         self.history[indices] = 0.0
