@@ -12,6 +12,7 @@ from scipy import stats
 from analysis import methods, paths, stored
 from analysis.studies import boreal_map as region_map
 from analysis.studies import replanning, site_choice, site_regression
+from analysis.validation import robustness_report
 from cleanrl_style import protocol
 
 VALIDATION = Path("docs/validation.md")
@@ -298,8 +299,9 @@ def scores(page: str, tower: str) -> dict[str, list[str]]:
 
 
 def misses(page: str) -> int:
-    """How many values the list at the page's end has."""
-    return len(re.findall(r"^\| ", page.split("What misses\n")[1], re.MULTILINE)) - 2
+    """How many values the list at the page's end has of what was measured or published."""
+    rows = re.findall(r"^\| .*", page.split("What misses\n")[1], re.MULTILINE)[2:]
+    return sum(not row.startswith(f"| {robustness_report.SPAN} |") for row in rows)
 
 
 def towers() -> str:
@@ -308,7 +310,8 @@ def towers() -> str:
     first, second = (scores(page, tower) for tower in TOWERS)
     header = ["monthly means", *(f"{tower}: {name.split()[-1]}" for tower in TOWERS for name in SCORES)]
     table = markdown(header, [[name, *first[name], *second[name]] for name in first])
-    return f"{table}\n{misses(page)} entries of that page miss, and are listed at its end.\n"
+    miss = f"{misses(page)} entries of that page miss what was measured or published, and are listed at its end."
+    return f"{table}\n{miss}\n"
 
 
 def missing() -> str:

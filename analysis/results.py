@@ -117,19 +117,35 @@ class Results:
         for run in self.runs:
             row = rows.setdefault((run.script, run.arguments["env_id"], run.setting), {})
             row.setdefault((run.arguments["seed"], run.arguments["site_seed"]), []).append(run)
+        rows = {key: self._planned(key, row) for key, row in rows.items()}
         return {
             key: [
                 self._replicate(*item)
                 for item in sorted(row.items(), key=lambda item: str(item[0]))
-                if self._complete(key, *item)
+                if self._complete(key, row, *item)
             ]
             for key, row in rows.items()
         }
 
-    def _complete(self, key, replicate, its_runs) -> bool:
-        """Whether one agent a weight is there for every weight of the experiment; if not, it is named."""
-        wanted = {weights_of(job.flags) for job in self.jobs if job.row == key and "preference" in job.flags}
-        lacking = wanted - {weights_of(run.arguments) for run in its_runs}
+    def _weights_of(self, key, row: dict) -> set[tuple]:
+        """Of agents of one weight each, the weights of the experiment, or if it has none those that any seed has."""
+        planned = {weights_of(job.flags) for job in self.jobs if job.row == key and "preference" in job.flags}
+        return planned or {weights_of(run.arguments) for its_runs in row.values() for run in its_runs} - {None}
+
+    def _planned(self, key, row: dict) -> dict:
+        """A row without agents of weights that its experiment has not, which are named."""
+        weights, kept = self._weights_of(key, row), {}
+        for replicate, its_runs in row.items():
+            kept[replicate] = [run for run in its_runs if not weights or weights_of(run.arguments) in weights]
+            for run in its_runs:
+                if run not in kept[replicate]:
+                    weight = as_text(weights_of(run.arguments))
+                    self.left_out.append(f"{run.folder}: of the weight {weight}, which the experiment has not")
+        return {replicate: its_runs for replicate, its_runs in kept.items() if its_runs}
+
+    def _complete(self, key, row, replicate, its_runs) -> bool:
+        """Whether one agent a weight is there for every weight of the row; if not, it is named."""
+        lacking = self._weights_of(key, row) - {weights_of(run.arguments) for run in its_runs}
         if lacking:
             seed, site_seed = replicate
             site = "" if site_seed is None else f", site seed {site_seed}"

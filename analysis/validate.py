@@ -77,7 +77,8 @@ PARTS: dict[str, tuple[str, Callable[[Args], Part]]] = {
 
 INTRODUCTION = """# Validation
 
-Written by `python analysis/validate.py`; every number is from that run. Observations, with their sources and licences,
+Written by `python analysis/validate.py`; every number is from that run, but for what every constant turns or moves in
+part 8, which is from `python analysis/studies/planting_signs.py`. Observations, with their sources and licences,
 are in [analysis/observations](../analysis/observations/README.md), equations in [model.md](model.md). Bias is modelled
 less measured, RMSE the root mean square error, r Pearson's correlation. **MISS** is a value outside the band or beyond
 the tolerance that the part states; all of them are listed at the end. Constants that were calibrated to

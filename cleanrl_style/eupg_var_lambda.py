@@ -160,6 +160,8 @@ if __name__ == "__main__":
     if args.baseline == "others" and args.num_envs == 1:
         protocol.fail("--baseline others is the mean of a batch's other episodes: --num-envs 2 or more is allowed")
     task = protocol.make_task(args, hide_site=args.hide_site)
+    if task.fixes_preference:
+        protocol.fail(f"--env-id {args.env_id}: it has a fixed_preference, and training is over all of them")
     episode_columns = task.episode_columns
     update_columns = (
         "iteration",

@@ -282,6 +282,8 @@ if __name__ == "__main__":
     if args.scalarization != "linear" and args.per_objective_advantages:
         protocol.fail("--per-objective-advantages is for --scalarization linear: it weighs each advantage by itself")
     task = protocol.make_task(args, hide_site=args.hide_site)
+    if task.fixes_preference:
+        protocol.fail(f"--env-id {args.env_id}: it has a fixed_preference, and training is over all of them")
     episode_columns = task.episode_columns
     loss_columns = ("policy_loss", "value_loss", "entropy", "old_approx_kl", "approx_kl", "clip_fraction")
     update_columns = (

@@ -244,10 +244,10 @@ def ppo_losses(agent, x, mask, action, old_logprob, advantage, target, args):
 
 if __name__ == "__main__":
     task = protocol.make_task(args, hide_site=args.hide_site)
+    if task.fixes_preference:
+        protocol.fail(f"--env-id {args.env_id}: it has a fixed_preference, and training is over all of them")
     if args.num_envs == 1 and 1 in (args.rollout_steps, args.total_timesteps % args.rollout_steps):
         protocol.fail("--num-envs 1: --rollout-steps and the rest of --total-timesteps have to be 2 or more, or 0")
-    if task.fixes_preference:
-        protocol.fail(f"--env-id {args.env_id}: it has a fixed_preference, and a group is spread over all")
     episode_columns = task.episode_columns
     gae_lambda = args.gae_lambda or [1.0 if name == "thaw" else 0.95 for name in task.objectives]
     if len(gae_lambda) not in (1, task.num_objectives):

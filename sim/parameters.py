@@ -120,8 +120,9 @@ def mean_annual_temperature(latitude_deg: float, uniform: float) -> float:
 def sample_site(site_seed: int, overrides: dict | None = None) -> dict[str, float]:
     """The parameters of the site with this seed, in the order of `site_parameters.csv`.
 
-    All are always drawn, so that an override (a value, or a (low, high) range to draw from) changes nothing else; those
-    that are not observed after the others, so that a new one changes no site. Raises ValueError for an unknown name or
+    All are always drawn, so that an override (a value, or a (low, high) range to draw from) changes nothing else, but
+    for the mean annual temperature, which is drawn around that of the latitude; those that are not observed after the
+    others, so that a new one changes no site. Raises ValueError for an unknown name or
     a value outside physical limits.
     """
     overrides = check_overrides(overrides)
@@ -197,12 +198,14 @@ def check_overrides(overrides: dict | None) -> dict[str, tuple[float, float]]:
 def check_site(site) -> None:
     """Raise ValueError for a site that has not all parameters, others, or one outside its physical limits."""
     if not isinstance(site, dict) or site.keys() != SITE_PARAMETERS.keys():
-        for name in check_mapping("site", site):
+        given = check_mapping("site", site)
+        for name in given:
             _lookup(SITE_PARAMETERS, "site parameter", name)
-        missing = next(name for name in SITE_PARAMETERS if name not in site)
+        missing = next(name for name in SITE_PARAMETERS if name not in given)
         raise ValueError(f"site: {missing} is missing; sim.sample_site and sim.middle_site give all")
-    values = np.array([site[name] for name in SITE_PARAMETERS])
-    if values.dtype.kind not in "fiu" or not ((values >= _LOWEST) & (values <= _HIGHEST)).all():
+    numbers = all(isinstance(value, float) for value in site.values())  # as sim.sample_site gives them
+    values = np.array([site[name] for name in SITE_PARAMETERS]) if numbers else None
+    if values is None or not ((values >= _LOWEST) & (values <= _HIGHEST)).all():
         for name, value in site.items():
             _check_number(name, value, SITE_PARAMETERS[name])
 

@@ -88,8 +88,9 @@ def simulate(
         be given. Intervals finer than the time step are averaged, precipitation summed.
     initial : first stocks by name: density_stems_ha, conifer_fraction, biomass_kgc_m2, soil_kgc_m2,
         conifer_deadwood_kgc_m2, deciduous_deadwood_kgc_m2, hwp_kgc_m2, organic_layer_m, oldest_age_years, or stems by
-        class (conifer_mature_stems_ha, ...); the rest is drawn, but for the stems' age, which follows from biomass and
-        density, and for dead wood, which is what the stand's deaths keep up, where they are not given.
+        class (conifer_mature_stems_ha, ...). Of stems, biomass and soil carbon what is not given is drawn; the stems'
+        age follows from biomass and density, dead wood is what the stand's deaths keep up, the organic layer is in
+        balance with the crowns, and there are no products.
     hold_stand : True keeps the stand as it begins: no stem dies, comes up, burns or is eaten, and on every 1 January
         trees, soil carbon, dead wood and organic layer are those of the first. Dead wood is then none, unless given.
     lai : leaf area of the first stand in full leaf, per ground area [m2 m-2]; None leaves it to crowns and site.
@@ -195,7 +196,12 @@ def simulate(
     if output == "daily":
         return daily
     boundary_c = stand.parameters[0, PARAMETER_NAMES.index(BOUNDARY)] - FREEZING_POINT_K
-    about = {"seed": seed, "time_step_minutes": time_step_minutes, "hold_stand": int(hold_stand), "site": place}
+    about = {
+        "seed": int(seed),
+        "time_step_minutes": int(time_step_minutes),
+        "hold_stand": int(hold_stand),
+        "site": place,
+    }
     place[BOUNDARY] = boundary_c + FREEZING_POINT_K
     about |= {"initial": stocks, "actions": per_year.tolist(), "boundary": boundary}
     about |= {"constants": {name: float(value) for name, value in (constants or {}).items()}}

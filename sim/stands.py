@@ -172,14 +172,15 @@ class Stands:
         ranges = {**INITIAL_RANGES, **check_initial_ranges(initial_ranges)}
         given = self._given(initial, len(stands))
         for what, values in (("sites", sites), ("seeds", seeds)):
-            if len(values) != len(stands):
-                raise ValueError(f"{what}: one for each of {len(stands)} stands is allowed, got {len(values)}")
+            number = len(values) if hasattr(values, "__len__") else 0
+            if number != len(stands):
+                raise ValueError(f"{what}: a list of one for each of {len(stands)} stands is allowed, got {number}")
         for site, its_seeds in zip(sites, seeds, strict=True):
             check_site(site)
             check_noise({**site, **self.constants, **self.weather})
             check_seeds("seeds", its_seeds)
         if observed is not None:
-            check_observed(observed, len(observed))
+            check_observed(observed, len(observed) if np.ndim(observed) else 0)
         for k, stand in enumerate(stands):
             self.seeds[stand] = seeds[k]
             self.years[stand] = 0

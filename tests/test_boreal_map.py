@@ -55,6 +55,20 @@ def test_what_is_not_there_cannot_be_drawn_again(tmp_path, monkeypatch):
         boreal_map.main(boreal_map.Args(redraw=True))
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"spacing": 0.0}, "--spacing 0: above 0 to 4 degrees is allowed"),
+        ({"spacing": 20.0}, "--spacing 20: above 0 to 4 degrees is allowed"),
+        ({"env_id": "boreal-timber-v0"}, "--env-id boreal-timber-v0: it has more than two objectives"),
+        ({"env_id": "boreal-site-v0"}, "--env-id boreal-site-v0: "),
+    ],
+)
+def test_what_no_map_can_be_of_ends_the_script(given, message):
+    with pytest.raises(SystemExit, match=message):
+        boreal_map.main(boreal_map.Args("plus_100", **given))
+
+
 def test_unknown_policies_end_the_script(tmp_path):
     with pytest.raises(
         SystemExit, match="--policy nobody: neither the folder .* a fixed strategy is zero_change, plus_100"

@@ -24,6 +24,11 @@ def daily():
     return sim.simulate(output="daily", **RUN)
 
 
+def test_numpys_integers_are_as_pythons(dataset):
+    with_numpys = RUN | {name: np.int64(RUN[name]) for name in ("years", "time_step_minutes", "seed")}
+    assert sim.simulate(output="xarray", **with_numpys).identical(dataset)
+
+
 @pytest.mark.parametrize("columns", [RECORD, DAILY])
 def test_every_column_has_a_meaning_of_its_own(columns):
     meanings = [meaning for _, meaning in columns.values()]

@@ -233,27 +233,44 @@ def test_a_method_that_no_experiment_has_is_in_every_table_of_methods(tmp_path):
     assert "zero_change" not in violations.index.get_level_values("method")
 
 
+def write_agent_of_one_weight(runs, seed, weight, **more):
+    write_run(
+        runs / f"{seed}-{weight}",
+        "eupg_fixed_lambda",
+        seed,
+        carbon=(weight,),
+        thaw=(1 - weight,),
+        weights=(weight,),
+        preference=weight,
+        vectorization="lockstep",
+        **more,
+    )
+
+
 def test_agents_of_one_weight_form_a_front(tmp_path, capsys):
     for seed in (1, 2):
         for weight in (0.0, 0.25, 0.5, 0.75, 1.0)[: 5 if seed == 1 else 4]:
-            write_run(
-                tmp_path / "runs" / f"{seed}-{weight}",
-                "eupg_fixed_lambda",
-                seed,
-                carbon=(weight,),
-                thaw=(1 - weight,),
-                weights=(weight,),
-                preference=weight,
-                vectorization="lockstep",
-            )
+            write_agent_of_one_weight(tmp_path / "runs", seed, weight)
+    write_agent_of_one_weight(tmp_path / "runs", 1, 0.9)
     row = make(tmp_path / "runs", tmp_path / "tables").loc[
         ("eupg_fixed_lambda", "boreal-generalist-v0", "vectorization=lockstep")
     ]
     assert row.seeds == 1 and row.cardinality == 5 and row.sparsity == pytest.approx(2 * 0.25**2)
-    assert (
-        "eupg_fixed_lambda, boreal-generalist-v0, seed 2: partial, without the agents of the weights 1"
-        in capsys.readouterr().err
-    )
+    said = capsys.readouterr().err
+    assert "eupg_fixed_lambda, boreal-generalist-v0, seed 2: partial, without the agents of the weights 1" in said
+    assert "1-0.9: of the weight 0.9, which the experiment has not" in said
+
+
+def test_seeds_of_other_weights_are_no_replicates(tmp_path, capsys):
+    """Where no experiment says which weights there are, it is those that any seed has."""
+    for seed, weight in ((1, 0.0), (2, 1.0)):
+        write_agent_of_one_weight(tmp_path / "runs", seed, weight, env_id="boreal-balanced-v0")
+    write_run(tmp_path / "runs" / "zero", "zero_change")
+    table = make(tmp_path / "runs", tmp_path / "tables")
+    assert "boreal-balanced-v0" not in table[table.seeds > 0].index.get_level_values("environment")
+    said = capsys.readouterr().err
+    assert "seed 1: partial, without the agents of the weights 1" in said
+    assert "seed 2: partial, without the agents of the weights 0" in said
 
 
 def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):

@@ -416,7 +416,9 @@ def test_where_no_store_can_be(tmp_path):
 
 
 def test_a_grid_has_each_point_once():
-    with pytest.raises(ValueError, match="longitude_deg: -180 and 180 are one meridian"):
+    with pytest.raises(ValueError, match="longitude_deg: each meridian once is allowed, and -180 is 180"):
         sim.sites_on_grid([60.0], [-180.0, 180.0])
+    with pytest.raises(ValueError, match="longitude_deg: each meridian once is allowed"):
+        sim.sites_on_grid([60.0], [-90.0, 0.0, 270.0])
     with pytest.raises(ValueError, match=r"latitude_deg: each number once is allowed, got \[56, 56\]"):
         sim.sites_on_grid([56, 56], [1])

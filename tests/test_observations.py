@@ -91,6 +91,13 @@ def test_towers_near_the_climate_are_cold_and_undisturbed():
     assert not {"CA-SF2", "US-Fcr", "US-Rpf", "CA-NS7", "FI-Hyy"} & set(near)
 
 
+def test_annual_sums_are_of_whole_courses():
+    """Of the aspen forest, the one that takes up most; a tower whose partitioning failed has no uptake."""
+    sums = forest_towers.annual_sums()
+    assert sums.gpp.idxmax() == forest_towers.ASPEN and 1.0 < sums.gpp.max() < 1.3
+    assert np.isnan(sums.gpp["CA-Ojp"]) and sums.nee["CA-Ojp"] < -0.2
+
+
 def test_halves_of_a_record_share_no_day():
     for climate in climate_records.records().values():
         even, odd = climate.halves()

@@ -200,14 +200,13 @@ def test_its_difference_to_gated_ppo_is_as_long_as_its_page_says():
     assert gone + new < 200
 
 
-def test_an_environment_of_one_preference_is_refused(tmp_path):
+@pytest.mark.parametrize("name", ["eupg_var_lambda", "ppo_gated", "ppo_curriculum", "ppo_group"])
+def test_an_environment_of_one_preference_is_refused(tmp_path, name):
     gym.register("one-preference-v0", "boreal_env:BorealEnv", kwargs={"years": 2, "fixed_preference": 0.3})
     given = ("--env-id", "one-preference-v0", "--run-dir", tmp_path / "run", "--vectorization", "lockstep")
     try:
-        with pytest.raises(
-            SystemExit, match="one-preference-v0: it has a fixed_preference, and a group is spread over"
-        ):
-            run_script("cleanrl_style/ppo_group.py", *given)
+        with pytest.raises(SystemExit, match="one-preference-v0: it has a fixed_preference, and training is over all"):
+            run_script(f"cleanrl_style/{name}.py", *given)
     finally:
         del gym.registry["one-preference-v0"]
     assert not (tmp_path / "run").exists()

@@ -21,6 +21,7 @@ from analysis.validation import (
 )
 from analysis.validation.held_stands import KINDS, hold
 from analysis.validation.scores import Band
+from sim.parameters import CONSTANTS
 
 UNDISTURBED = {"fire": False, "insects": False}
 
@@ -127,6 +128,12 @@ def test_temperature_within_the_organic_layer():
             "organic_layer_m": 0.30,
         }
     )
+    below = days.assign(surface_soil_temperature_c=[2.0, 0.0])
+    node = CONSTANTS["surface_soil_depth_m"].low / 2.0
+    deep = tower_report.temperature_below_moss(below, days.organic_layer_m.iloc[0] + node / 2.0)
+    assert deep.iloc[0] == pytest.approx((days.soil_top_temperature_c.iloc[0] + 2.0) / 2.0)
+    with pytest.raises(ValueError, match="is not between the organic layer and"):
+        tower_report.temperature_below_moss(below, 0.01)
     np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.05), [10.0, -15.0 + 7.0 / 3.0])
     np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.15), [6.0, -8.0])
     np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.25), [6.0 - 8.0 / 3.0, -8.0 + 8.0 / 3.0])

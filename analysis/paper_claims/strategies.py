@@ -78,7 +78,7 @@ def ordered(evidence, name: str, first: str, second: str, what: str, papers: str
 )
 def gated_has_more_conifers(evidence):
     what = "conifer fraction in the last year"
-    return ordered(evidence, "final_conifer_fraction", GATED, CURRICULUM, what, "0.1 - 0.35", 0.1)
+    return ordered(evidence, "final_conifer_fraction", GATED, CURRICULUM, what, "0.1 - 0.35", 0.025)
 
 
 @claim(

@@ -5,7 +5,8 @@
 
 A stand on every land point of a grid over the latitudes that sites are sampled from, simulated twice by
 `sim.simulate_many`, with and without the policy, under the same weather and dice. Climate follows latitude as for
-sampled sites, and all else is sampled; `--climate` takes a gridded file instead, and then every land point that it has.
+sampled sites, and all else is sampled; `--climate` takes a gridded file instead, which has to span the grid, and of its
+land points those that the file has.
 Leaves results/studies/boreal_map.csv, a row a point, and docs/images/boreal_map.png. The simulations are kept in
 runs/boreal_map, and the same command goes on where it was killed.
 """
@@ -37,6 +38,7 @@ FIGURE = Path("docs/images/boreal_map.png")
 FIRST_SEED = 5_000_000_000  # of the points' sites and dice: beyond those of training and evaluation
 VARIABLES = ("planted_stems_ha", "net_carbon_change_kgc_m2", "active_layer_depth_m")
 POINT = ["latitude_deg", "longitude_deg"]
+WIDEST = 4.0  # spacing [degrees] that the map is still one with
 LOWEST_LATITUDE = 48.0  # that is drawn
 
 
@@ -51,13 +53,15 @@ class Args:
     env_id: str | None = None
     """world of the stands (None: the policy's; of a fixed strategy boreal-balanced-v0)"""
     climate: Path | None = None
-    """NetCDF file or zarr store of gridded climate (None: by latitude), see sim.sites_on_grid"""
+    """NetCDF file or zarr store of climate over the whole grid (None: by latitude), see sim.sites_on_grid"""
     spacing: float = 0.5
     """of the grid, degrees of latitude; of longitude twice as many"""
     years: int = 50
     """length of the simulations"""
     address: str = HERE
     """where: "none", all cores of this machine; "local", Ray on it; or the address of a Ray cluster"""
+    overwrite: bool = False
+    """simulate anew what runs/boreal_map keeps, such as of another version of the simulator"""
     redraw: bool = False
     """draw the picture again from results/studies/boreal_map.csv, and simulate nothing"""
     quick: bool = False
@@ -120,8 +124,8 @@ def sites(args: Args) -> pd.DataFrame:
 
 
 def study(args: Args, store: str, env_id: str, world: dict, policy: Callable, folder: Path) -> pd.DataFrame:
-    """A row a point: what was planted there [stems ha-1 yr-1], the share of conifers in it, and thaw depth [m] and
-    carbon [kgC m-2] at the end, less those without the policy."""
+    """A row a point: what was planted there [stems ha-1 yr-1], the share of conifers in it, and, less those without the
+    policy, thaw depth [m], mean of the last years, and carbon [kgC m-2], sum of all."""
     shared = {
         "years": args.years,
         "seed": FIRST_SEED,
@@ -129,6 +133,7 @@ def study(args: Args, store: str, env_id: str, world: dict, policy: Callable, fo
         "preference": args.preference,
         "variables": VARIABLES,
         "address": args.address,
+        "overwrite": args.overwrite,
         **world,
     }
     climate = args.climate.stem if args.climate else "latitude"
@@ -165,18 +170,19 @@ def sentences(table: pd.DataFrame, preference: float, years: int) -> str:
 
     return (
         f"At a carbon weight of {preference:g} the policy plants {planted.mean():.0f} stems/ha a year, {conifers:.0%} "
-        f"of them conifers. After {years} years thaw is {change(thaw.mean())} than without it in the mean of "
-        f"{len(table):,} stands, {change(thaw.median())} in the middle one ({(thaw < 0).mean():.0%} thaw less deep); a "
-        f"stand has {abs(carbon):.1f} kgC/m2 {'more' if carbon > 0 else 'less'}."
+        f"of them conifers. In the last {min(LAST, years)} of {years} years thaw is {change(thaw.mean())} than without "
+        f"it in the mean of {len(table):,} stands, {change(thaw.median())} in the middle one ({(thaw < 0).mean():.0%} "
+        f"thaw less deep); at their end a stand has {abs(carbon):.1f} kgC/m2 {'more' if carbon > 0 else 'less'}."
     )
 
 
 def title(table: pd.DataFrame, settings: dict) -> str:
     """The picture's title."""
-    thaw = table.thaw_depth_change_m
+    thaw, years = table.thaw_depth_change_m, settings["years"]
     return (
-        f"{settings['policy']}, carbon weight {settings['preference']:g}: thaw after {settings['years']} years "
-        f"{thaw.mean():+.2f} m in the mean of {len(table):,} stands, {thaw.median():+.2f} m in the middle one"
+        f"{settings['policy']}, carbon weight {settings['preference']:g}: thaw in the last {min(LAST, years)} of "
+        f"{years} years {thaw.mean():+.2f} m in the mean of {len(table):,} stands, {thaw.median():+.2f} m in the "
+        "middle one"
     )
 
 
@@ -262,6 +268,8 @@ def main(args: Args) -> None:
         return
     if args.quick:
         args.spacing, args.years = 4.0, 3
+    if not 0.0 < args.spacing <= WIDEST:
+        protocol.fail(f"--spacing {args.spacing:g}: above 0 to {WIDEST:g} degrees is allowed")
     if args.climate is not None and not args.climate.exists():
         protocol.fail(f"--climate {args.climate}: there is no such file")
     name, env_id, policy = policy_of(args)
@@ -269,6 +277,8 @@ def main(args: Args) -> None:
         protocol.fail(f"--env-id {env_id}: allowed are {', '.join(boreal_env.REGISTERED)}")
     if boreal_env.REGISTERED[env_id]["mode"] != "generalist":
         protocol.fail(f"--env-id {env_id}: it is of one site; a generalist's is allowed")
+    if len(boreal_env.REGISTERED[env_id].get("objectives", ("carbon", "thaw"))) > 2:
+        protocol.fail(f"--env-id {env_id}: it has more than two objectives, and --preference is one number")
     world = {key: value for key, value in gym.spec(env_id).kwargs.items() if key != "mode"}
     try:
         folder = paths.runs(args.quick) / "boreal_map"

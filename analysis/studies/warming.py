@@ -345,8 +345,8 @@ def published_table(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         (
             "frozen volume of the upper 3 m, per K of the world",
             *(f"{-share:+.0%}" for share in volume),
-            "-20 to -30 %, up to 3 K (IPCC AR6 WGI, 9.5.2); of the upper 2 m -10 to -40 % (Burke et al. 2020, "
-            "Cryosphere 14, 3155)",
+            "-20 to -30 %, up to 3 K of the world, so not for ssp585 (IPCC AR6 WGI, 9.5.2); of the upper 2 m -10 to "
+            "-40 % (Burke et al. 2020, Cryosphere 14, 3155)",
         ),
         (
             "sites, or area, with permafrost in the upper 3 m",

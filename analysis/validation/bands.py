@@ -39,14 +39,14 @@ held: on every 1 January trees, soil carbon and organic layer are put back to th
 stems/ha of 41-100 years, young of 21-40, old of more than 100, half of each species where mixed; open ground has no
 stems. Soil carbon is drawn, 2-10 kgC/m2 as in an episode. No fire, no insects. Cells are the median over the sites
 (10-90 %), the verdict of the median and the share of sites in the band; no verdict where the band is not meant for the
-stand.
+stand. So uptake and respiration of deciduous stands have none: of the towers one is in such a forest.
 
 {document.table(["", "band", *ALL, "source"], rows, left=len(ALL) + 3)}
 
 What felling a stand of mature conifers does to the surface soil, on the same sites and weather: at once (the organic
 layer still that of the conifers) and when the organic layer has become that of open ground.
 
-{document.table(["", "warming [K]", "band"], pair_rows, left=3)}
+{document.table(["", "warming [K]", "band", "source"], pair_rows, left=4)}
 
 {_permafrost_text(runs, balanced)}
 
@@ -131,7 +131,8 @@ def _pairs(runs: dict[str, Run]) -> tuple[list[list[str]], list[Miss]]:
     rows, misses = [], []
     for label, kind in (("organic layer as it was", FELLED), ("organic layer of open ground", "open")):
         sample = WARMING.value(runs[kind]) - forest
-        rows.append([label, _cell(WARMING, FELLED, {FELLED: sample}), _limits(WARMING, {FELLED: sample})])
+        cells = [_cell(WARMING, FELLED, {FELLED: sample}), _limits(WARMING, {FELLED: sample})]
+        rows.append([label, *cells, WARMING.source])
         misses += _miss(f"warming of the surface soil [K], {label}", WARMING, FELLED, sample)
     return rows, misses
 

@@ -30,7 +30,7 @@ DENSITIES = (800.0, 1500.0, 2000.0)
 FIRE_RETURN = Band(80.0, 200.0)
 KILLED = Band(0.65, 1.0)
 BURNED = Band(1.5, 4.5)
-OUTBREAKS = Band(1.0, 5.0)
+OUTBREAKS = Band(2.0, 5.0)
 INSECT_KILL = Band(0.02, 0.20)
 MORTALITY = {"conifer": Band(0.28, 1.8), "deciduous": Band(0.7, 4.4)}
 SOURCES = {
@@ -105,8 +105,8 @@ def report(sites: int) -> Part:
     )
     text = f"""Stands held as in part 1, with fire and insects, {sites} sites for {YEARS} years: {years} stand-years of
 each kind, the last as an episode of the environment starts. Intervals are 95 % (Poisson). *Input* is what the simulator
-draws or is given, from the very sources of the band; flammability was calibrated to the return of fire. Dry and wet
-sites are the halves by annual precipitation.
+draws or is given, so that it cannot miss by itself: the paper's ranges, and for fire those of the sources named.
+Flammability was calibrated to the return of fire. Dry and wet sites are the halves by annual precipitation.
 
 {document.table(["fire", "stand", "value", "literature", "verdict", "source"], fire_rows, left=6)}
 

@@ -24,7 +24,7 @@ CLOSED = ("mature conifer", "mature deciduous", "mature mixed")
 FLOOR = Band(0.85, 1.0)
 FLOOR_SOURCE = "forests near Whitehorse .92 (NICOP 2008); below air until thaw is deep (Karunaratne and Burn 2004)"
 
-#: Spruce as at Wickersham (1240 stems/ha) on a deep organic layer, in the climate of US-Prr, 8 km from it.
+#: Spruce as at Wickersham (1240 stems/ha) on a deep organic layer, in the climate of US-Prr, 20 km from it.
 DEEP_MOSS = {"conifer_mature_stems_ha": 1240.0, "biomass_kgc_m2": 3.2, "organic_layer_m": 0.25}
 INTERIOR_ALASKA = {
     name: US_PRR.site[name]
@@ -35,8 +35,8 @@ INTERIOR_ALASKA = {
         "deep_boundary_temperature_k",
     )
 }
-DEEP_MOSS_THAW = Band(0.36, 0.80)
-DEEP_MOSS_SOURCE = "Wickersham, 36 years, .36-.52 (Viereck et al. 2008, abstract); .8 is asked for"
+DEEP_MOSS_THAW = Band(0.36, 0.52)
+DEEP_MOSS_SOURCE = "Wickersham, 36 years (Viereck et al. 2008, abstract)"
 
 SUMMER = "the moss on top does not dry by itself; ice-poor mineral soil; exchange in and below the canopy"
 

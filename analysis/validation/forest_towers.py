@@ -7,6 +7,7 @@ from analysis.validation import towers
 FAILED_G = 5.0  # gC m-2 month-1: a partitioning whose GPP or respiration is as negative as this has failed
 UNDISTURBED_BEFORE = 1950
 WARMEST_C = 2.0  # mean annual air temperature of a tower that is still near the sampled climate
+ASPEN = "CA-Oas"  # the one deciduous forest among them, in the warmest of their climates
 
 
 def carbon_fluxes() -> pd.DataFrame:
@@ -33,6 +34,14 @@ def evapotranspiration() -> pd.Series:
 def courses(months: pd.DataFrame | pd.Series) -> pd.DataFrame | pd.Series:
     """Median over the years of each site and month, indexed by (site, month)."""
     return months.groupby(["site", "month"]).median()
+
+
+def annual_sums() -> pd.DataFrame:
+    """`gpp`, `reco`, `nee` [kgC m-2 yr-1] of each site near the sampled climate; NaN where a month is missing."""
+    course = courses(carbon_fluxes())[["gpp", "reco", "nee"]]
+    days = pd.Series({month: pd.Timestamp(2001, month, 1).days_in_month for month in range(1, 13)})
+    sums = {name: (course[name].unstack() * days).sum(axis=1, skipna=False) / 1000.0 for name in course}
+    return pd.DataFrame(sums).loc[near_climate()]
 
 
 def mean_annual_temperature() -> pd.Series:

@@ -155,8 +155,8 @@ Even-aged stands by age against stands of that age (within {percent(stand_develo
 [stand_development.csv](../analysis/observations/stand_development.csv) with their sources, and towers of known age in
 ABCflux. The band is the range of the observations, {percent(stand_development.SLACK)} wider at both ends (NEP:
 {stand_development.SLACK_NEP:g} kgC/m2/yr). The observed stands are in warmer climates, 2 to −3 degC against −10 to −5
-here; their NPP, GPP and NEP include an understorey and moss. Part 1's bands are of boreal forests of all
-ages, these of towers of one age; of deciduous stands the two hardly overlap.
+here; their NPP, GPP and NEP include an understorey and moss. GPP and NEP of old deciduous stands are those
+of one tower, in the warmest of those climates.
 
 {document.table(["species", "quantity", "age", "model", "observed", "verdict", "from"], ages, left=7)}
 

@@ -13,6 +13,7 @@ from sim.spin_up import BOUNDARY
 from sim.task.episodes import BALANCED_WORLD
 
 YEARS, QUICK_YEARS = 50, 10
+SPAN = "sites that span the sampled"  # where a constant, not the simulator against what was measured, is looked at
 PLANS = {"zero change": 12, "+100 conifers": 24, "+100 deciduous": 20, "−100": 2}
 ZERO_CHANGE = Band(-3.0, 3.0)  # how far a constant moved by 10 % may move the return of zero change
 
@@ -148,7 +149,7 @@ def signs_found(table: pd.DataFrame, sites: int) -> tuple[str, list[Miss]]:
         rows.append([f"`{level.constant}`", level.value, *values, ", ".join(found)])
         misses.append(
             Miss(
-                "sites that span the sampled",
+                SPAN,
                 f"`{level.constant}` = {level.value}: {', '.join(found)}",
                 level.group.removeprefix("constants "),
             )

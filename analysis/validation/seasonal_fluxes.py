@@ -10,7 +10,8 @@ from analysis.validation.document import BLACK, BLUE, GREY, ORANGE, Miss, Part, 
 from analysis.validation.held_stands import KINDS, Run, hold
 from analysis.validation.scores import skill
 
-KINDS_SHOWN = {"mature conifer": BLUE, "mature deciduous": ORANGE}
+CONIFER, DECIDUOUS = "mature conifer", "mature deciduous"
+KINDS_SHOWN = {CONIFER: BLUE, DECIDUOUS: ORANGE}
 YEARS = 5
 TOLERANCE = 0.2
 MARGIN = 0.05
@@ -56,20 +57,23 @@ def report(sites: int) -> Part:
     towers = measured()
     rows, misses = [], []
     for name, label in FLUXES.items():
-        observed = towers[name].median()
-        cells = [number(value) for value in observed]
-        rows.append([f"{label} [{UNITS[name]}]", f"{len(towers[name])} towers", *cells, *[""] * 5])
-        for kind in KINDS_SHOWN:
-            course = np.median(runs[kind][name], axis=0)
-            s = skill(course, observed)
-            cells = [number(s.bias, sign=True), number(s.rmse), number(s.r)]
-            rows.append(["", kind, *(number(value) for value in course), *cells])
-            outside = [calendar.month_abbr[m] for m in range(1, 13) if _outside(course[m - 1], towers[name], m)]
-            verdict = "**MISS**" if abs(s.bias) > TOLERANCE * observed.abs().mean() else "in"
-            rows[-1] += [", ".join(outside) or "none", verdict]
-            if verdict != "in":
-                what = f"{label} over the year: bias {number(s.bias, sign=True)} {UNITS[name]}, towers' median course"
-                misses.append(Miss(kind, what, LIKELY[name][int(s.bias > 0.0)]))
+        conifers = towers[name].drop(index=forest_towers.ASPEN, errors="ignore")
+        unit = f"{label} [{UNITS[name]}]"
+        observed = conifers.median()
+        course = np.median(runs[CONIFER][name], axis=0)
+        rows += _rows(unit, f"{len(conifers)} towers, conifers", observed, CONIFER, course)
+        outside = [calendar.month_abbr[m] for m in range(1, 13) if _outside(course[m - 1], conifers, m)]
+        bias = skill(course, observed).bias
+        verdict = "**MISS**" if abs(bias) > TOLERANCE * observed.abs().mean() else "in"
+        rows[-1] += [", ".join(outside) or "none", verdict]
+        if verdict != "in":
+            what = f"{label} over the year: bias {number(bias, sign=True)} {UNITS[name]}, towers' median course"
+            misses.append(Miss(CONIFER, what, LIKELY[name][int(bias > 0.0)]))
+        if forest_towers.ASPEN in towers[name].index:
+            course = np.median(runs[DECIDUOUS][name], axis=0)
+            aspen = towers[name].loc[forest_towers.ASPEN]
+            rows += _rows(unit, f"{forest_towers.ASPEN}, aspen", aspen, DECIDUOUS, course)
+            rows[-1] += ["", ""]
     temperature = forest_towers.mean_annual_temperature()[forest_towers.near_climate()]
     text = f"""Mature stands held as in part 1 on {sites} sites, {YEARS} years, over the towers in forests without a
 disturbance since {forest_towers.UNDISTURBED_BEFORE} and with a mean annual temperature of at most
@@ -78,12 +82,23 @@ average {number(temperature.min(), 1)} to {number(temperature.max(), 1)} degC, t
 towers have it is no evidence that it is right for sites so much colder. Medians over sites, of
 towers each with the median of its years. A course misses if its bias exceeds {percent(TOLERANCE)} of the towers' mean
 magnitude; months outside are those in which it leaves the towers' range by more than {percent(MARGIN)} of their largest
-month.
+month. All towers but one stand in forests of conifers; deciduous stands are set beside that one,
+{forest_towers.ASPEN}, at {number(temperature[forest_towers.ASPEN], 1)} degC, without a verdict.
 
 {document.table(["", "", *calendar.month_abbr[1:], "bias", "RMSE", "r", "months outside", "verdict"], rows, left=2)}
 
 ![Seasonal courses](images/validation_seasons.png)"""
     return Part(text, {"validation_seasons.png": draw(runs, towers)}, misses)
+
+
+def _rows(label: str, of_towers: str, observed: pd.Series, kind: str, course: np.ndarray) -> list[list[str]]:
+    """The towers' row, and the stand's with bias, RMSE and r; the stand's lacks its last two cells."""
+    s = skill(course, observed)
+    cells = [number(s.bias, sign=True), number(s.rmse), number(s.r)]
+    return [
+        [label, of_towers, *(number(value) for value in observed), *[""] * 5],
+        ["", kind, *(number(value) for value in course), *cells],
+    ]
 
 
 def _outside(value: float, towers: pd.DataFrame, month: int) -> bool:
@@ -93,13 +108,15 @@ def _outside(value: float, towers: pd.DataFrame, month: int) -> bool:
 
 @document.styled
 def draw(runs: dict[str, dict[str, np.ndarray]], towers: dict[str, pd.DataFrame]) -> bytes:
-    """PNG: range and median of the towers (grey, black) and of the stands (10-90 % of sites)."""
+    """PNG: range and median of the towers of conifers (grey, black), the one of aspen, and the stands (10-90 %)."""
     figure = document.new_figure(8.5, 6.0)
     month = np.arange(1, 13)
     for ax, (name, label) in zip(figure.subplots(2, 2).ravel(), FLUXES.items(), strict=True):
-        measured = towers[name]
-        ax.fill_between(month, measured.min(), measured.max(), color=GREY, alpha=0.3, lw=0, label="towers, range")
-        ax.plot(month, measured.median(), color=BLACK, lw=1.5, label="towers, median")
+        conifers = towers[name].drop(index=forest_towers.ASPEN, errors="ignore")
+        ax.fill_between(month, conifers.min(), conifers.max(), color=GREY, alpha=0.3, lw=0, label="conifers, range")
+        ax.plot(month, conifers.median(), color=BLACK, lw=1.5, label="towers of conifers, median")
+        if forest_towers.ASPEN in towers[name].index:
+            ax.plot(month, towers[name].loc[forest_towers.ASPEN], color=BLACK, lw=1.2, ls="--", label="tower of aspen")
         for kind, colour in KINDS_SHOWN.items():
             low, median, high = np.percentile(runs[kind][name], [10, 50, 90], axis=0)
             ax.fill_between(month, low, high, color=colour, alpha=0.25, lw=0)
@@ -109,6 +126,6 @@ def draw(runs: dict[str, dict[str, np.ndarray]], towers: dict[str, pd.DataFrame]
         ax.set_title(label)
         ax.set_ylabel(UNITS[name])
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
     figure.suptitle("Seasonal courses: mature stands on sampled sites and undisturbed boreal forest towers")
     return document.png(figure)

@@ -14,7 +14,7 @@ NEAR = 0.2  # a stand counts for an age if its own differs by no more than this 
 SLACK = 0.25  # of a value: what plots of a stand, allometry and roots leave open
 SLACK_NEP = 0.03  # kgC m-2 yr-1
 WINTER_GPP = 0.05  # share of the year's GPP in December to February beyond which a record's gaps were filled wrongly
-DECIDUOUS_TOWERS = ("CA-Oas",)
+DECIDUOUS_TOWERS = (forest_towers.ASPEN,)
 MIXED_TOWERS = ("US-Rpf",)  # birch, aspen and willow among spruce seedlings
 
 

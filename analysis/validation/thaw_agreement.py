@@ -20,6 +20,8 @@ MEASURES: dict[str, Callable[[Record], np.ndarray]] = {
     "temperature of the permafrost's top": lambda of: -of("permafrost_top_temperature_c").mean(axis=1),
 }
 
+ROUNDING = 1e-9  # of a measure: what is below, an order of summing decides
+
 
 def effects(record: np.ndarray, plans: int) -> dict[str, np.ndarray]:
     """What each plan adds to the first one, in every measure, (sites x other plans,).
@@ -31,7 +33,8 @@ def effects(record: np.ndarray, plans: int) -> dict[str, np.ndarray]:
         return record[:, :, sim.RECORD_NAMES.index(name)]
 
     scores = {name: measure(column).reshape(-1, plans) for name, measure in MEASURES.items()}
-    return {name: (values[:, 1:] - values[:, :1]).ravel() for name, values in scores.items()}
+    found = {name: (values[:, 1:] - values[:, :1]).ravel() for name, values in scores.items()}
+    return {name: np.where(np.abs(effect) > ROUNDING, effect, 0.0) for name, effect in found.items()}
 
 
 def disagreement(first: np.ndarray, second: np.ndarray) -> float:

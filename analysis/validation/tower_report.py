@@ -16,6 +16,7 @@ from analysis.validation.document import Miss, Part, number, percent
 from analysis.validation.scores import skill
 from analysis.validation.tower_comparison import QUANTITIES
 from sim.io import disaggregation
+from sim.parameters import CONSTANTS
 from sim.physical_constants import LATENT_HEAT_FUSION, MJ_PER_DAY, WATER_DENSITY
 from sim.state import DAYS
 
@@ -53,6 +54,7 @@ LIKELY = {
 #: Compared without a verdict, with the reason in the text.
 UNJUDGED = {"SE-Svb": (), "US-Prr": ("ground heat",)}
 SNOW_DEPTH_TOLERANCE = 0.2  # of the measured depth
+SPRING_SENSORS_M = 0.44  # below the moss's surface: the mean of 0.34, 0.44 and 0.54
 SENSOR_DEPTH_M = 0.19  # at US-Prr, below the surface: 0.14 m of moss above the sensors' zero (Ikawa et al. 2024), 0.05
 
 
@@ -98,6 +100,20 @@ def temperature_in_moss(modelled: pd.DataFrame, depth: float) -> pd.Series:
     share = 2.0 * depth / whole
     above = upper + (middle - upper) * share.clip(0.0, 1.0)
     return above.where(share <= 1.0, middle + (lower - middle) * (share - 1.0).clip(0.0, 1.0))
+
+
+def temperature_below_moss(modelled: pd.DataFrame, depth: float) -> pd.Series:
+    """Modelled temperature [degC] at a depth [m] below the moss's surface, in the mineral soil: a straight line between
+    its top and the middle of the surface soil.
+
+    Raises ValueError for a depth that is not between the two.
+    """
+    node = CONSTANTS["surface_soil_depth_m"].low / 2.0
+    share = (depth - modelled["organic_layer_m"]) / node
+    if not share.between(0.0, 1.0).all():
+        raise ValueError(f"{depth:g} m is not between the organic layer and {node:g} m below it")
+    upper, lower = modelled["soil_top_temperature_c"], modelled["surface_soil_temperature_c"]
+    return upper + share * (lower - upper)
 
 
 def report(repeats: int) -> Part:
@@ -289,11 +305,13 @@ def _spring(spread: Comparison, measured: Comparison) -> tuple[str, list[Miss]]:
     are judged."""
     fluxes = towers.daily_fluxes(poker_flat.spring_fluxes())
     soil = fluxes[[f"soil_{depth}_cm_c" for depth in (34, 44, 54)]].mean(axis=1)
+    for comparison in (spread, measured):
+        comparison.modelled["spring_soil_c"] = temperature_below_moss(comparison.modelled, SPRING_SENSORS_M)
     rows, watts = [], 1.0 / MJ_PER_DAY
     for label, column, series, factor in (
         ("latent heat [W m-2]", "latent_heat_mj_m2", _mostly_measured(fluxes, "latent_heat_w_m2"), watts),
         ("sensible heat [W m-2]", "sensible_heat_mj_m2", _mostly_measured(fluxes, "sensible_heat_w_m2"), watts),
-        ("soil, 0.34-0.54 m [degC]", "surface_soil_temperature_c", soil, 1.0),
+        ("soil, 0.34-0.54 m [degC]", "spring_soil_c", soil, 1.0),
     ):
         row = [label, number(series.mean(), 1)]
         for comparison in (spread, measured):
@@ -302,11 +320,11 @@ def _spring(spread: Comparison, measured: Comparison) -> tuple[str, list[Miss]]:
         rows.append(row)
     found = []
     limits = QUANTITIES["soil temperature"]
-    deeper = skill(measured.modelled.loc[fluxes.index, "surface_soil_temperature_c"], soil)
+    deeper = skill(measured.modelled.loc[fluxes.index, "spring_soil_c"], soil)
     if abs(deeper.bias) > limits.tolerance or deeper.rmse > limits.largest_rmse:
         what = f"soil at 0.34-0.54 m, March to May 2013: bias of days {number(deeper.bias, 1, sign=True)} degC, RMSE "
         what += f"{number(deeper.rmse, 1)}, r {number(deeper.r)}"
-        found.append(Miss(spread.site, what, "one surface node below the organic layer, too quick in spring"))
+        found.append(Miss(spread.site, what, "a winter that ends too warm below snow (the monthly course above)"))
     header = ["March to May 2013, days", "measured", "spread: bias", "RMSE", "r", "half-hours: bias", "RMSE", "r"]
     march = fluxes.index.month == 3
     depth = fluxes.loc[march, "snow_depth_cm"].mean()
@@ -319,6 +337,9 @@ def _spring(spread: Comparison, measured: Comparison) -> tuple[str, list[Miss]]:
     text = f"""The spring of 2013 was measured in half-hours. The same run with them in place of the spread days:
 
 {document.table(header, rows)}
+
+The soil's sensors are {SPRING_SENSORS_M:g} m below the moss's surface on average; the model's is taken there, between
+the top of the mineral soil and the middle of its upper metre.
 
 Snow lay {number(depth, 0)} cm deep in March 2013, {water[0]}-{water[1]} mm of water at
 {SNOW_DENSITY[0]:g}-{SNOW_DENSITY[1]:g} kg m⁻³ (Ikawa et al. 2024; Sturm et al. 2010); the model has

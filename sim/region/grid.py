@@ -55,8 +55,8 @@ def check_axis(name: str, values) -> np.ndarray:
         raise ValueError(f"{name}: each number once is allowed, got {values!r}")
     if not allowed:
         raise ValueError(f"{name}: a sequence of numbers in [{low:g}, {high:g}] {unit} is allowed, got {values!r}")
-    if name == LONGITUDE and numbers[-1] - numbers[0] == 360.0:
-        raise ValueError(f"{name}: -180 and 180 are one meridian, and one of them is allowed")
+    if name == LONGITUDE and len(np.unique(numbers % 360.0)) < len(numbers):
+        raise ValueError(f"{name}: each meridian once is allowed, and -180 is 180; got {values!r}")
     return numbers
 
 
