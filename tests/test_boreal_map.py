@@ -39,7 +39,7 @@ def test_the_map_of_a_strategy(tmp_path, monkeypatch, capsys):
     assert figure.read_bytes() == first
     (tmp_path / "results/studies").mkdir()
     (tmp_path / "results/quick/studies/boreal_map.csv").rename(tmp_path / "results/studies/boreal_map.csv")
-    assert "After 3 years thaw is" in document_results.section(None, "boreal_map")
+    assert "In the last 3 of 3 years thaw is" in document_results.section(None, "boreal_map")
 
 
 def test_cells_lie_where_their_stands_are():
