@@ -118,6 +118,16 @@ def test_energy_offset_by_hand():
     assert tower_comparison.energy_offset(fluxes) == (12.0, 1)
 
 
+def test_temperature_below_the_organic_layer():
+    """A straight line from the top of the mineral soil to the middle of its surface layer, and nowhere else."""
+    columns = {"soil_top_temperature_c": [2.0, -4.0], "surface_soil_temperature_c": [4.0, 0.0], "organic_layer_m": 0.30}
+    days, node = pd.DataFrame(columns), CONSTANTS["surface_soil_depth_m"].low / 2.0
+    np.testing.assert_allclose(tower_report.temperature_below_moss(days, 0.30 + node / 2.0), [3.0, -2.0])
+    for depth in (0.01, 0.31 + node):
+        with pytest.raises(ValueError, match="is not between the organic layer and"):
+            tower_report.temperature_below_moss(days, depth)
+
+
 def test_temperature_within_the_organic_layer():
     """Straight lines from the surface to the layer's middle, and from there to the mineral soil."""
     days = pd.DataFrame(
@@ -128,12 +138,6 @@ def test_temperature_within_the_organic_layer():
             "organic_layer_m": 0.30,
         }
     )
-    below = days.assign(surface_soil_temperature_c=[2.0, 0.0])
-    node = CONSTANTS["surface_soil_depth_m"].low / 2.0
-    deep = tower_report.temperature_below_moss(below, days.organic_layer_m.iloc[0] + node / 2.0)
-    assert deep.iloc[0] == pytest.approx((days.soil_top_temperature_c.iloc[0] + 2.0) / 2.0)
-    with pytest.raises(ValueError, match="is not between the organic layer and"):
-        tower_report.temperature_below_moss(below, 0.01)
     np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.05), [10.0, -15.0 + 7.0 / 3.0])
     np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.15), [6.0, -8.0])
     np.testing.assert_allclose(tower_report.temperature_in_moss(days, 0.25), [6.0 - 8.0 / 3.0, -8.0 + 8.0 / 3.0])
