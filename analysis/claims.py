@@ -62,7 +62,7 @@ MEANING = {
 HEAD = """\
 # The paper's claims
 
-What of the paper ([Dsouza et al. 2025](https://arxiv.org/abs/2509.19846)) holds here: every claim that a number can
+What of the paper ([Dsouza et al. 2025](https://arxiv.org/abs/2509.19846)) holds here: its claims that a number can
 test, with the paper's value, ours, and a verdict that is computed from the numbers by the rule that stands with the
 claim. Written by `python analysis/claims.py`; not to be edited.
 """
@@ -87,11 +87,12 @@ states another's fact once more names it and has none. A level, a return or a de
 beside ours and never failed.
 
 **Verdicts.** A claim that one thing is more than another holds if the whole interval of the difference has its sign. It
-does not if the interval has the other sign, or no effect worth the name in it: of a return a quarter of what the best
-constant plans gain over doing nothing (25 points of score), of how far a preference is followed a quarter of what the
-best plans' return changes by from weight 0 to 1, of what has the paper's units a quarter of its effect. Beyond that
-signs are judged, not sizes: how large the paper's difference is stands beside ours. A value or a range is met if all of
-our interval lies in it, give or take a tenth, and not if all of it lies outside. A cost is met if ours is no larger. A
+does not if the interval has the other sign or, whatever its sign, no effect worth the name in it: of a return a quarter
+of what the best constant plans gain over doing nothing (25 points of score), of how far a preference is followed a
+quarter of what the best plans' return changes by from weight 0 to 1, of what has the paper's units a quarter of its
+effect. That is much: planting 100 stems a year blindly and the best constant plan are less far apart. Beyond that signs
+are judged, not sizes: how large the paper's difference is stands beside ours. A value or a range is met if all of our
+interval lies in it, give or take a tenth, and not if all of it lies outside. A cost is met if ours is no larger. A
 claim of several parts does not hold if one of them does not. A bootstrap over few seeds is too narrow (of normal values
 it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five, and for the t interval of the seeds'
 mean to agree. Dozens of intervals are judged one by one, uncorrected. Those over training seeds hold for these
@@ -138,6 +139,8 @@ def explanation(claim: Claim, found: Finding, numbers: dict[Claim, int]) -> list
         lines.append(f"Holds if {found.rule}.")
     if found.verdict == FAILS and found.small:
         lines.append("It fails because no effect large enough to count is left, not by a sign of its own.")
+    if found.remark:
+        lines.append(found.remark)
     if claim.repeats is not None:
         number = numbers[claim.repeats]
         lines.append(f"No vote: the fact is that of [claim {number}](#claim-{number}).")

@@ -1,6 +1,8 @@
 import functools
 import re
 import shutil
+from collections import Counter
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 
@@ -126,6 +128,24 @@ def test_why_a_claim_fails_is_known():
     assert below(seeds(-0.1, -0.2, -0.05), least=0.5).small and not below(seeds(2, 1, 3), least=0.5).small
     holds = above(seeds(2, 1, 3), least=0.5)
     assert all_of(fails[1], holds).small and not all_of(*fails).small and not all_of(holds, holds).small
+
+
+def test_how_much_of_the_smallest_effect_a_failing_interval_reaches():
+    far, near = above(seeds(0.1, -0.1, 0.4), least=0.5), above(seeds(0.0, -0.1, 0.1), least=0.5)
+    assert (far.reached, near.reached) == pytest.approx((0.8, 0.2))
+    assert all_of(far, near).reached == pytest.approx(0.2)  # fails until the least effect is smaller than that
+    assert np.isnan([above(seeds(-2, -3, -1), least=0.5).reached, above(seeds(2, 1, 3), least=0.5).reached]).all()
+    said = summary.counted(Counter({HOLDS: 1, FAILS: 3}), [far.reached, near.reached])
+    assert "3 do not hold" in said and "(1 of them because numbers say otherwise, 2 because" in said
+    assert "if a tenth counted, 1 of these would be open" in said
+
+
+def test_a_verdict_of_the_greedy_policies_says_so():
+    rows = [Row(performance.SAMPLED, "", seeds(0.1, -1, 1))]
+    of_greedy = performance.greedy_finding(rows, above, seeds(2, 1, 3))
+    assert of_greedy.verdict == HOLDS and of_greedy.remark.endswith("of the sampled ones: undecided.")
+    assert performance.greedy_finding(rows, above, seeds(0.1, -1, 1)).remark == ""
+    assert performance.greedy_finding([Row(performance.SAMPLED, "", "not run yet")], above, seeds(2, 1, 3)).remark == ""
 
 
 def test_numbers_as_text():
@@ -286,6 +306,8 @@ def test_a_sentence_says_what_its_number_is_over():
     sentence = summary.Sentence(performance.curriculum_beats_gated, "x", "Yes", "No", "Open")
     row = Row("x", "4", seeds(1, 0.5, 2, count=3))
     said = sentence.text(7, Finding([row], UNDECIDED))
+    both = replace(sentence, beside="y").text(7, Finding([row, Row("y", "", seeds(1, -1, 3))], UNDECIDED))
+    assert "the paper's 4; y: 1 [−1, 3]; [claim 7]" in both
     assert said == "Open (x: 1 [0.5, 2] over 3 training seeds, the paper's 4; [claim 7](#claim-7))."
 
 

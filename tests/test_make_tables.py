@@ -655,6 +655,8 @@ def test_what_learning_is_up_against(tmp_path):
         "years_20_50": 0.5,
     }
     rows = [numbers | dict(zip(names, case, strict=True)) | {"reference": "uniform"} for case in cases]
+    untold = {"contrast": "thin", "objective": "carbon", "weighting": "return"}
+    rows = [row | {"effect_low": -0.5} if untold.items() <= row.items() else row for row in rows]
     stored.write(tmp_path / "studies" / "signal_to_noise.csv", pd.DataFrame(rows), {})
     parts = pd.DataFrame(
         {
@@ -680,6 +682,8 @@ def test_what_learning_is_up_against(tmp_path):
     table = learning_difficulty.make(results).set_index(["of", "quantity"])
     assert table.loc[("variance of returns", "site %"), ["carbon", "thaw"]].tolist() == [40, 90]
     assert table.loc[("thin", "effect on the return"), ["thaw", "thaw_low", "thaw_high"]].tolist() == [1, 0.5, 2]
+    late = table.loc[("thin", "effect that comes after 20 years %"), ["carbon", "thaw"]]
+    assert np.isnan(late.carbon) and late.thaw == 50  # an effect that may be nothing has no late share
     assert table.loc[("thin", "effect that GAE rewards carry %"), "carbon"] == 25
     gradient = table.loc[(learning_difficulty.GRADIENT, "episodes, total utility, baseline: none")]
     assert gradient[["carbon", "carbon_low", "thaw", "thaw_low"]].tolist() == [20, 10, np.inf, 90]

@@ -43,6 +43,7 @@ CARBON, THAW = 1.0, 0.0  # weights
 OBJECTIVE = {CARBON: "carbon_return", THAW: "thaw_return"}
 PART = 0.25  # of what constant plans gain: learnt, if an agent gains more
 FEWEST_SITES = 5
+NOT_PAIRED = "the same, seeds not paired"
 LIMIT = "That a quarter of what the best constant plan gains counts as learnt is our choice; how fast is not judged."
 
 
@@ -121,7 +122,7 @@ def asymmetry(evidence):
         Row("share learnt of carbon", "", seeds(carbon)),
         Row("share learnt of thaw", "", seeds(thaw)),
         Row("carbon less thaw", "above 0", apart),
-        Row("the same, seeds not paired", "", unpaired(carbon, thaw)),
+        Row(NOT_PAIRED, "", unpaired(carbon, thaw)),
     ]
     return finding(rows, above(apart, what="the difference"))
 

@@ -111,23 +111,26 @@ class Answer:
     rule: str
     waits: bool = False  # for more training seeds
     small: bool = False  # it does not hold, for no other reason than that no effect large enough to count is left
+    reached: float = np.nan  # if small: the share of the least effect that the interval reaches up to
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What our results say of a claim."""
+    """What our results say of a claim; remark : a sentence that is printed with it."""
 
     rows: list[Row]
     verdict: str
     rule: str = ""
     waits: bool = False
     small: bool = False
+    reached: float = np.nan
+    remark: str = ""
 
 
 def finding(rows: list[Row], answer: Answer, otherwise: str = FAILS) -> Finding:
     """The finding of an answer; `otherwise` is the verdict on a claim that does not hold."""
     verdict = UNDECIDED if answer.holds is None else HOLDS if answer.holds else otherwise
-    return Finding(rows, verdict, answer.rule, answer.waits, answer.small)
+    return Finding(rows, verdict, answer.rule, answer.waits, answer.small, answer.reached)
 
 
 @dataclass(frozen=True)
@@ -165,7 +168,9 @@ def above(number: Number, limit: float = 0.0, least: float | None = None, what: 
     if not number.decides:
         return Answer(None, rule, waits=True)
     fails = high <= limit or (least is not None and high < limit + least)
-    return Answer(False if fails else True if low > limit else None, rule, small=fails and high > limit)
+    small = bool(fails and high > limit)
+    reached = (high - limit) / least if small else np.nan
+    return Answer(False if fails else True if low > limit else None, rule, small=small, reached=reached)
 
 
 def below(number: Number, limit: float = 0.0, least: float | None = None, what: str = "the interval") -> Answer:
@@ -212,6 +217,7 @@ def all_of(*answers: Answer) -> Answer:
     holds = [answer.holds for answer in answers]
     rule = " and ".join(dict.fromkeys(answer.rule for answer in answers))
     decided = False if False in holds else None if None in holds else True
-    small = all(answer.small for answer in answers if answer.holds is False)
+    fails = [answer for answer in answers if answer.holds is False]
+    small = bool(fails) and all(answer.small for answer in fails)
     waits = decided is None and any(answer.waits for answer in answers)
-    return Answer(decided, rule, waits, small=decided is False and small)
+    return Answer(decided, rule, waits, small, min(one.reached for one in fails) if small else np.nan)

@@ -360,7 +360,8 @@ def interception_adds(evidence, pair: str) -> Number:
     "less, but not so much less, and still stores more after fifty years: the carbon return counts what is gained "
     "alone. Planting stores more.",
     note="By its introduction less snow on the ground lets the cold in, and large gains of energy in summer can "
-    "overwhelm that; its table calls the conflict complex.",
+    "overwhelm that. Its table has an arrow down, which elsewhere in it is harm, for interception as for absorption, "
+    "and calls the conflict complex; the claim is the introduction's.",
 )
 def stems(evidence):
     carbon, thaw = (effect(evidence, STEM_PAIR, f"{name}_return") for name in ("carbon", "thaw"))
@@ -369,7 +370,7 @@ def stems(evidence):
         Row(f"carbon return, {STEM_PAIR}", "up (more biomass)", carbon),
         Row("carbon gained [kgC/m2/yr]", "", effect(evidence, STEM_PAIR, "net_carbon_change_kgc_m2")),
         off(evidence, STEM_PAIR, "carbon", "fire"),
-        Row("thaw return that interception adds", "benefit", caught),
+        Row("thaw return that interception adds", "benefit (introduction); down (table)", caught),
         Row("thaw return without interception", "cost (absorption)", rest),
         Row("thaw return, both", "complex", thaw),
         *(

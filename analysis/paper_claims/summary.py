@@ -4,14 +4,14 @@ from collections import Counter
 from dataclasses import dataclass
 
 from analysis.paper_claims import asymmetry, curriculum, mechanisms, paper_itself, performance, preference
-from analysis.paper_claims.claim import CONTRADICTS, DIRECTION, FAILS, HOLDS, Claim, Finding, Number
+from analysis.paper_claims.claim import CONTRADICTS, DIRECTION, FAILS, HOLDS, QUARTER, Claim, Finding, Number
 
 
 @dataclass(frozen=True)
 class Sentence:
     """A sentence on a claim: how it reads if the claim holds, if it does not, and if that is open.
 
-    row : the line of the claim's table whose numbers stand behind it.
+    row : the line of the claim's table whose numbers stand behind it; beside : another that has to be read with it.
     """
 
     claim: Claim
@@ -19,6 +19,7 @@ class Sentence:
     holds: str
     fails: str
     otherwise: str
+    beside: str = ""
 
     def text(self, number: int, found: Finding) -> str:
         """The sentence; number : the claim's."""
@@ -29,6 +30,7 @@ class Sentence:
         if row is not None:
             over = f" over {row.ours.basis}" if isinstance(row.ours, Number) and row.ours.basis else ""
             numbers = f"{row.what}: {row.ours}{over}" + (f", the paper's {row.paper}" if row.paper else "")
+            numbers += "".join(f"; {other.what}: {other.ours}" for other in found.rows if other.what == self.beside)
         return f"{words} ({numbers}; [claim {number}](#claim-{number}))."
 
 
@@ -67,6 +69,7 @@ SENTENCES = (
         "Fixed λ EUPG learns carbon better than thaw, by agents of equal seeds",
         "Fixed λ EUPG learns carbon no better than thaw",
         "Whether Fixed λ EUPG learns carbon better than thaw is open",
+        beside=asymmetry.NOT_PAIRED,
     ),
     Sentence(
         asymmetry.physics_hides_thaw,
@@ -87,8 +90,8 @@ SENTENCES = (
         mechanisms.stems,
         "thaw return without interception",
         "Stems store carbon, help permafrost by the snow that they catch and harm it by what they absorb",
-        "The paper says that stems store carbon, help permafrost by the snow that they catch and harm it by what they "
-        "absorb; not all of it holds here",
+        "The paper says that stems store carbon, help permafrost by the snow that they catch (its table says the "
+        "opposite) and harm it by what they absorb; not all of it holds here",
         "Stems and permafrost: part of what the paper says is open",
     ),
     Sentence(
@@ -100,20 +103,26 @@ SENTENCES = (
 )
 
 
-def counted(verdicts: Counter, small: int) -> str:
-    """The first sentence: how the directions came out, a vote a fact; small : facts that fail by that alone."""
+A_TENTH = 0.1  # instead of QUARTER
+
+
+def counted(verdicts: Counter, reached: list[float]) -> str:
+    """The first sentence: how the directions came out, a vote a fact; reached : of the facts that fail by no large
+    effect alone, the share of the smallest that counts which the interval reaches."""
+    small, open_by_less = len(reached), sum(share >= A_TENTH / QUARTER for share in reached)
     open_ = verdicts.total() - verdicts[HOLDS] - verdicts[FAILS]
     numbers = verdicts[FAILS] - small
     return (
         f"Of the {verdicts.total()} facts about what comes out ahead or which way a mechanism works {verdicts[HOLDS]} "
         f"hold here, {verdicts[FAILS]} do not hold in our simulator ({numbers} of them because numbers say otherwise, "
-        f"{small} because no effect large enough to count is left), and {open_} are open or cannot be tested."
+        f"{small} because no effect large enough to count, a quarter, is left; if a tenth counted, {open_by_less} of "
+        f"these would be open), and {open_} are open or cannot be tested."
     )
 
 
 def sentences(findings: dict[Claim, tuple[int, Finding]], directions: Counter) -> str:
     """All of them as a list; findings : a claim's number and finding."""
     voting = [found for claim, (_, found) in findings.items() if claim.kind == DIRECTION and claim.repeats is None]
-    small = sum(found.small for found in voting if found.verdict == FAILS)
-    lines = [counted(directions, small), *(one.text(*findings[one.claim]) for one in SENTENCES)]
+    reached = [found.reached for found in voting if found.verdict == FAILS and found.small]
+    lines = [counted(directions, reached), *(one.text(*findings[one.claim]) for one in SENTENCES)]
     return "".join(f"{number}. {line}\n" for number, line in enumerate(lines, start=1))

@@ -15,6 +15,8 @@ COLUMNS = {"of": "of", "quantity": "quantity", "carbon": "carbon", "thaw": "thaw
 GRADIENT = "EUPG's gradient, as much signal as noise"
 VALUES = {"return": "variance of returns", "one year": "variance of one year's rewards"}
 YEAR = "5"  # of the action: the stand is there, and most of the episode still to come
+OTHER_YEARS = ("0", "15", "30")
+LATE = "years_20_50"  # share of the effect that comes late
 #: Row -> (weighting of the years to come, column, factor).
 EFFECTS = {
     "effect on the return": ("return", "effect", 1),
@@ -24,7 +26,7 @@ EFFECTS = {
     "episodes to tell the actions apart": ("return", "episodes", 1),
     "episodes, site baseline": ("return", "site_episodes", 1),
     "episodes, state baseline": ("return", "state_episodes", 1),
-    "effect that comes after 20 years %": ("return", "years_20_50", 100),
+    "effect that comes after 20 years %": ("return", LATE, 100),
     "effect that discounted rewards carry %": ("discounted", "carried", 100),
     "effect that GAE rewards carry %": ("GAE", "carried", 100),
     "episodes, site baseline, GAE": ("GAE", "site_episodes", 1),
@@ -89,8 +91,14 @@ def make(results) -> pd.DataFrame:
         case = table[(table.reference == UNIFORM) & (table.contrast == contrast) & (table.year == YEAR)]
         for quantity, (weighting, column, factor) in EFFECTS.items():
             there = case[case.weighting == weighting].set_index("objective")
+            if column == LATE:  # a share of what may be nothing says nothing
+                there[column] = there[column].where((there.effect_low > 0) | (there.effect_high < 0))
             rows.append({"of": contrast, "quantity": quantity, **of_objectives(there, column, factor)})
         uniform = table[(table.reference == UNIFORM) & (table.contrast == contrast)]
+        for year in OTHER_YEARS:
+            there = uniform[(uniform.weighting == "return") & (uniform.year == year)].set_index("objective")
+            quantity = f"episodes to tell the actions apart, year {year}"
+            rows.append({"of": contrast, "quantity": quantity, **of_objectives(there, "episodes", 1)})
         for quantity, (weighting, noise) in SHARED.items():
             years = {
                 objective: uniform[(uniform.weighting == weighting) & (uniform.objective == objective)]
