@@ -175,8 +175,9 @@ class BorealEnv(Described, gym.Env, EzPickle):
     the remaining stand nears the mix. Without a change of density the mix has nothing to act on: 10 to 14 are alike,
     and 12 stands for doing nothing. `action_masks()` says which actions can be carried out in full; the others are
     legal, do what can be done, and cost a penalty. Planting ends at 2000 stems/ha, thinning at 150, and it cuts only
-    trees of `harvest_min_class` and older. The density penalty is another: a stand at or above
-    `density_limit` after the action costs it whatever the action, valid or not.
+    trees of `harvest_min_class` and older. What would end at 2000 exactly is masked, against rounding, but costs no
+    penalty. The density penalty is another: a stand at or above `density_limit` after the action costs it whatever
+    the action, valid or not.
 
     ## Reward Space
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, dead wood, soil and products over `carbon_scale`,

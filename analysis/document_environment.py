@@ -73,6 +73,9 @@ year,
 - `density_change` is what was carried out of the action, `mix_change` how much the action changed the conifer fraction
   of the stand (without a density change 0 but for round-off).
 
+Where it never snows the drought index can grow without end; it is observed up to its limit. Within the 1000 years that
+`years` allows, or with constants at their ends, carbon stocks can pass theirs.
+
 Before the first year both indices are those of an action that changes nothing: the middle density, the nearest mix.
 
 `boreal_env.action_masks(observations)` reads whole observations, 43 or 105 columns; of m objectives give

@@ -137,7 +137,8 @@ def main(args: Args) -> None:
             print(text.loc[(table.seeds > 0).to_numpy(), list(main_results.TERMINAL)].to_string(index=False))
             elsewhere = [run for run in results.runs if run.arguments["env_id"] not in main_results.ENVIRONMENTS]
             if elsewhere:
-                print(f"\nRuns of other environments, {len(elsewhere)}, are in {folder / 'detailed_objectives.md'}.")
+                places = "detailed_objectives*.md, those of three and more objectives in main_results_*.md too"
+                print(f"\nRuns of other environments, {len(elsewhere)}, are in {folder}: {places}.")
     others = many_objectives.make(results)
     for stem in many_objectives.STEMS:
         for path in set(folder.glob(f"{stem}_*.csv")) - {folder / f"{name}.csv" for name in others}:

@@ -13,7 +13,7 @@ from scripts import ROOT, run_script
 from cleanrl_style import protocol
 from cleanrl_style.flags import policy_file
 from cleanrl_style.ppo_group import Agent
-from cleanrl_style.protocol.agents import own_script
+from cleanrl_style.protocol.agents import load_script, own_script
 
 TOY = "toy_env:toy-v0"
 SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
@@ -46,6 +46,15 @@ def test_the_agent_of_a_script_elsewhere(tmp_path):
     with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_own.py to import; script=path"):
         protocol.load_policy(tmp_path / "run")
     evaluate_again(tmp_path / "run", protocol.load_policy(tmp_path / "run", script=path))
+
+
+def test_scripts_in_two_folders_have_each_its_own_helper(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "of_both.py").write_text(f"NAME = {name!r}\n")
+        (tmp_path / name / "method.py").write_text("import of_both, json, sim.wind\nNAME = of_both.NAME\n")
+    assert [load_script("method", tmp_path / name / "method.py").NAME for name in ("a", "b", "a")] == ["a", "b", "a"]
+    assert "of_both" not in sys.modules and "json" in sys.modules and "sim.wind" in sys.modules
 
 
 def test_an_agent_may_ask_for_the_number_of_actions_and_for_what_lies_beside_its_script(tmp_path, monkeypatch):

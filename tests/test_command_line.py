@@ -24,15 +24,17 @@ from cleanrl_style import flags, protocol
 from cleanrl_style.protocol import command_line, run_folder
 
 
+SHORT = (
+    *("--env-id", "boreal-site-specific-v0", "--vectorization", "lockstep", "--num-envs", 4, "--update-epochs", 1),
+    *("--rollout-steps", 200, "--total-timesteps", 200, "--eval-episodes", 1),
+)
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """A short run on the fixed site."""
     folder = tmp_path_factory.mktemp("runs") / "run"
-    run_script(
-        "cleanrl_style/ppo_gated.py",
-        *("--env-id", "boreal-site-specific-v0", "--vectorization", "lockstep", "--num-envs", 4, "--update-epochs", 1),
-        *("--rollout-steps", 200, "--total-timesteps", 200, "--eval-episodes", 1, "--run-dir", folder),
-    )
+    run_script("cleanrl_style/ppo_gated.py", *SHORT, "--run-dir", folder)
     return folder
 
 
@@ -201,6 +203,17 @@ def test_a_finished_run_that_is_damaged_is_not_called_finished(run, tmp_path, na
     if harmed is not None:
         (folder / name).write_bytes(harmed)
     assert run_folder.damage_of(folder, 5) == name
+
+
+@pytest.mark.parametrize("name, content", [("episodes.csv", None), ("updates.csv", None), ("summary.png", b"")])
+def test_a_finished_run_that_lacks_a_file_is_not_called_finished(run, tmp_path, name, content):
+    folder = tmp_path / "run"
+    shutil.copytree(run, folder)
+    (folder / name).unlink()
+    if content is not None:
+        (folder / name).write_bytes(content)
+    with pytest.raises(SystemExit, match=f"{name} is (damaged|missing); --overwrite starts over"):
+        run_script("cleanrl_style/ppo_gated.py", *SHORT, "--run-dir", folder)
 
 
 def test_a_finished_run_that_lost_an_episode_of_one_weight_is_damaged(run, tmp_path):

@@ -1,6 +1,7 @@
 """The observation: its table, what each entry is, its space, its page."""
 
 import csv
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ import sim
 from analysis import document_environment
 from boreal_env import OBSERVATION, OBSERVATION_NAMES, Observed
 from sim.task import observation
+from sim.task.objectives import HISTORY_NAMES
 
 
 @pytest.mark.parametrize("action", [0, 4, 12, 20, 24])
@@ -57,6 +59,13 @@ def test_physical_limits_of_the_site_lie_in_the_observation_space(corner):
     observed = [sim.SITE_PARAMETERS[name] for name in sim.OBSERVED_SITE_PARAMETERS]
     expected = [(getattr(p, corner) - p.low) / (p.high - p.low) for p in observed]
     np.testing.assert_allclose(observation[SITE], expected, rtol=1e-5)
+
+
+def test_drought_is_observed_up_to_its_limit():
+    record = np.zeros((2, len(HISTORY_NAMES)))
+    record[:, HISTORY_NAMES.index("drought_index")] = 50.0, 14_471.0
+    row = next(row for row in OBSERVATION if row.name == "drought_index_1yr")
+    assert row.source(SimpleNamespace(record=record)).tolist() == [50.0, row.high]
 
 
 def test_penalties_of_heavy_constants_lie_in_the_observation_space():

@@ -438,6 +438,7 @@ def test_learns_the_toy(tmp_path):
         (["--eval-weights", "0", "1.5"], "--eval-weights must lie in [0, 1], not 1.5"),
         (["--eval-weights", "nan"], "--eval-weights must lie in [0, 1], not nan"),
         (["--eval-weights", "0", "0"], "none twice"),
+        (["--eval-weights", "0.1234567891", "0.1234567892"], "none twice to six digits"),
         (["--eval-episodes", "0"], "--eval-episodes must lie in [1, "),
         (["--env-id", "forest-v0"], "forest"),
         (["--env-id", "no_such_module:forest-v0"], "no_such_module"),

@@ -151,6 +151,17 @@ def test_before_the_first_checkpoint_the_same_command_starts_it_again(tmp_path, 
     assert capsys.readouterr().err.strip() == f"{tmp_path}: interrupted; the same command starts it again"
 
 
+def test_after_overwrite_it_says_without_overwrite(tmp_path, monkeypatch, capsys):
+    def interrupt(run, *row):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run_folder.Run, "log", interrupt)
+    given = ("--run-dir", tmp_path, "--overwrite", *arguments("eupg_var_lambda", TOY))
+    with pytest.raises(SystemExit, match="130"):
+        run_script("cleanrl_style/eupg_var_lambda.py", *given)
+    assert capsys.readouterr().err.endswith(": interrupted; the same command without --overwrite starts it again\n")
+
+
 def copy(interrupted, tmp_path):
     """A copy of the interrupted run, to be harmed."""
     return shutil.copytree(interrupted[0], tmp_path / "copy")
@@ -167,8 +178,9 @@ def resume(folder):
         lambda data: b"",
         lambda data: data[:1000],
         lambda data: data[: len(data) // 2] + bytes([data[len(data) // 2] ^ 1]) + data[len(data) // 2 + 1 :],
+        lambda data: data[: (at := data.rindex(b"data.pkl"))] + b"\xff" + data[at + 1 :],
     ],
-    ids=["empty", "cut", "one bit"],
+    ids=["empty", "cut", "one bit", "one bit of a name"],
 )
 def test_a_damaged_checkpoint_is_refused(interrupted, tmp_path, harm):
     folder = copy(interrupted, tmp_path)
@@ -195,6 +207,16 @@ def test_a_damaged_checkpoint_is_refused(interrupted, tmp_path, harm):
 def test_a_checkpoint_of_another_program_is_refused(interrupted, tmp_path, state):
     folder = copy(interrupted, tmp_path)
     torch.save(state, folder / "checkpoint.pt")
+    with pytest.raises(SystemExit, match="checkpoint.pt is no checkpoint of this version of ppo_gated; --overwrite"):
+        resume(folder)
+
+
+def test_a_table_of_other_columns_is_refused(interrupted, tmp_path):
+    folder = copy(interrupted, tmp_path)
+    size = torch.load(folder / "checkpoint.pt", weights_only=False)["table_sizes"]["updates"]
+    header, *rows = (folder / "updates.csv").read_bytes()[:size].splitlines(keepends=True)
+    first, second, *others = header.split(b",")
+    (folder / "updates.csv").write_bytes(b"".join([b",".join([second, first, *others]), *rows]))
     with pytest.raises(SystemExit, match="checkpoint.pt is no checkpoint of this version of ppo_gated; --overwrite"):
         resume(folder)
 
@@ -348,6 +370,7 @@ def test_an_environment_without_a_state_starts_over(tmp_path, capsys):
     run_script(*command)
     whole = {path: path.read_bytes() for path in tmp_path.iterdir() if path.name != "timing.csv"}
     (tmp_path / "evaluation.csv").unlink()
+    (tmp_path / "episodes.csv").write_bytes(whole[tmp_path / "episodes.csv"][:30])  # interrupted once more, and earlier
     run_script(*command)
     assert "gives no state to go on from: the interrupted run starts over" in capsys.readouterr().out
     assert whole == {path: path.read_bytes() for path in tmp_path.iterdir() if path.name != "timing.csv"}

@@ -212,7 +212,7 @@ def load_script(name: str, path) -> ModuleType:
     if spec is None or not Path(path).exists():
         raise FileNotFoundError(f"script {path}: no Python file")
     module = sys.modules[name] = importlib.util.module_from_spec(spec)  # where texts of its annotations are looked up
-    folder = str(Path(path).parent.absolute())
+    folder, before = str(Path(path).parent.absolute()), {*sys.modules}
     sys.path.insert(0, folder)  # as python has it, for what lies beside the script
     try:
         spec.loader.exec_module(module)
@@ -222,4 +222,17 @@ def load_script(name: str, path) -> ModuleType:
         raise ValueError(f"script {path}: {error}") from error
     finally:
         sys.path.remove(folder)
+        _forget_neighbours(folder, before)
     return module
+
+
+def _forget_neighbours(folder: str, before: set[str]) -> None:
+    """Forget what a script imported from beside it alone: another's helper of the same name is another module."""
+    for name in {name.partition(".")[0] for name in {*sys.modules} - before}:
+        file = getattr(sys.modules.get(name), "__file__", None)
+        if file is None or name in before or not Path(file).is_relative_to(folder):
+            continue
+        parts = {part: sys.modules.pop(part) for part in [*sys.modules] if part == name or part.startswith(f"{name}.")}
+        elsewhere = importlib.util.find_spec(name)
+        if elsewhere is not None and elsewhere.origin == file:
+            sys.modules.update(parts)

@@ -72,9 +72,9 @@ def make_task(args, *, preference=None, hide_site: bool = False) -> Task:
         weights = [tuple(task.check_weights(value)) for value in args.eval_weights]
     with refusing("--eval-episodes"):
         evaluation_seeds(task, args.eval_episodes)
-    if not weights or len(set(weights)) < len(weights):
+    if not weights or len({tuple(np.round(weight, 6)) for weight in weights}) < len(weights):  # as tables are read
         given = " ".join(str(weight) for weight in args.eval_weights)
-        fail(f"--eval-weights {given}: at least one weight, and none twice, is allowed")
+        fail(f"--eval-weights {given}: at least one weight, and none twice to six digits, is allowed")
     if len(set(tracked := getattr(args, "track", ()))) < len(tracked):
         fail(f"--track {' '.join(tracked)}: each once is allowed")
     for package in tracked:

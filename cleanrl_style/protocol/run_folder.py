@@ -131,7 +131,7 @@ class Run:
         self.env_seconds, self.shown, self.course = 0.0, None, None
         self.played_seconds = 0.0  # of a year and stand of the course
         with self._writing():
-            self._claim_folder()
+            self._claim_folder(tables)
             self._load_checkpoint()
             self.first_step = self.env_step = self.checkpoint_step  # of this process, so far
             if task.boreal and plays_validation and hasattr(args, "total_timesteps"):
@@ -139,7 +139,9 @@ class Run:
                 if course.fits:
                     self.course, tables = course, {**tables, "validation": course.columns}
             sizes = self.checkpoint["table_sizes"] if self.checkpoint else dict.fromkeys(tables, 0)
-            if set(sizes) != set(tables):
+            if set(sizes) != set(tables) or any(
+                size and header_of(self.folder / f"{name}.csv") != list(tables[name]) for name, size in sizes.items()
+            ):
                 self._no_checkpoint()
             self.tables |= {
                 name: Table(self.folder / f"{name}.csv", columns, sizes[name]) for name, columns in tables.items()
@@ -151,7 +153,7 @@ class Run:
 
     # ------------------------------------------------------------------------------------- opening the folder
 
-    def _claim_folder(self) -> None:
+    def _claim_folder(self, tables) -> None:
         """Make the folder this run's, and lock it by its timing.csv; what is there of this very run stays."""
         config_file, timing_file = self.folder / "config.json", self.folder / "timing.csv"
         # what a killed process left half-written, or empty, does not make the folder another's
@@ -164,7 +166,7 @@ class Run:
         if occupied and is_foreign(config_file):
             fail(f"--run-dir {self.folder}: not a run's folder (its config.json has no script and arguments)")
         if occupied and not self.args.overwrite:
-            self._compare(config_file)
+            self._compare(config_file, tables)
         self.folder.mkdir(parents=True, exist_ok=True)
         timing_file.touch()
         self.lock = open(timing_file, "r+b")
@@ -194,7 +196,7 @@ class Run:
         with replacing(self.folder / "config.json") as file:
             file.write(json.dumps(self.config, indent=2, default=str).encode() + b"\n")
 
-    def _compare(self, config_file: Path) -> None:
+    def _compare(self, config_file: Path, tables) -> None:
         """Exit if the folder's run has other arguments, or is finished; warn if it was made by other code."""
         try:
             config = json.loads(config_file.read_text(encoding="utf-8"))
@@ -209,7 +211,8 @@ class Run:
                 "(--run-dir names another folder, --overwrite starts over)"
             )
         if (self.folder / "evaluation.csv").exists():
-            lost = [name for name in self._made_by_all() if not (self.folder / name).exists()]
+            made = (*self._made_by_all(), *(f"{name}.csv" for name in tables))
+            lost = [name for name in made if is_empty(self.folder / name)]
             damaged = damage_of(self.folder, len(self.args.eval_weights)) or next(iter(lost), None)
             if damaged:
                 what = "damaged" if (self.folder / damaged).exists() else "missing"
@@ -272,8 +275,11 @@ class Run:
             pickle.UnpicklingError,
             ImportError,
             AttributeError,
+            ValueError,
+            OSError,
         ) as error:
-            fail(f"{path} is damaged ({str(error).splitlines()[0]}); --overwrite starts over")
+            what = [*str(error).splitlines(), type(error).__name__][0]
+            fail(f"{path} is damaged ({what}); --overwrite starts over")
         steps = getattr(self.args, "total_timesteps", 0)
         if (
             not isinstance(checkpoint, dict)
@@ -284,15 +290,15 @@ class Run:
             or not isinstance(checkpoint["table_sizes"], dict)
         ):
             self._no_checkpoint()
+        if checkpoint["envs"] is None:
+            print(f"{self.args.env_id} gives no state to go on from: the interrupted run starts over", flush=True)
+            return
         for name, size in checkpoint["table_sizes"].items():
             table = self.folder / f"{name}.csv"
             if not table.exists() or table.stat().st_size < size:
                 fail(f"{table} is shorter than when the checkpoint was written; --overwrite starts over")
             if table.read_bytes()[size - 1 : size] != b"\n":
                 fail(f"{table} is not as it was when the checkpoint was written; --overwrite starts over")
-        if checkpoint["envs"] is None:
-            print(f"{self.args.env_id} gives no state to go on from: the interrupted run starts over", flush=True)
-            return
         self.checkpoint, self.checkpoint_step = checkpoint, checkpoint["global_step"]
 
     def _no_checkpoint(self) -> None:
@@ -469,10 +475,11 @@ class Run:
         self.lock.close()
         for number, handler in self.handlers.items():
             signal.signal(number, handler)
+        command = "the same command without --overwrite" if self.args.overwrite else "the same command"
         then = (
-            f"the same command goes on from step {self.checkpoint_step:,}"
+            f"{command} goes on from step {self.checkpoint_step:,}"
             if self.checkpoint_step
-            else "the same command starts it again"
+            else f"{command} starts it again"
         )
         if isinstance(error, KeyboardInterrupt):
             print(f"\n{self.folder}: interrupted; {then}", file=sys.stderr)
@@ -502,6 +509,17 @@ def is_foreign(config_file: Path) -> bool:
     except ValueError:
         return False
     return not isinstance(config, dict) or not {"script", "arguments"} <= config.keys()
+
+
+def is_empty(path: Path) -> bool:
+    """Whether a file has nothing in it, or is not there."""
+    return not path.exists() or not path.stat().st_size
+
+
+def header_of(table: Path) -> list[str]:
+    """Columns of a table."""
+    with table.open(newline="", encoding="utf-8") as file:
+        return next(csv.reader(file), [])
 
 
 def damage_of(folder: Path, weights: int) -> str | None:

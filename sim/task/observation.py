@@ -93,7 +93,14 @@ def a_year_ago(entry: str) -> Source:
 
 growth_start, fall_start = parameter("growth_start_day"), parameter("fall_start_day")
 planted, thinned = recorded("planted_stems_ha"), recorded("thinned_stems_ha")
+drought_index = recorded("drought_index")
+DRIEST = 1e4  # mm
 conifer_fraction_after_action = recorded("conifer_fraction_after_action")
+
+
+def drought(now: Moment) -> np.ndarray:
+    """The past year's drought index, up to the limit of its row: only snow sets it back, and there may be none."""
+    return np.minimum(drought_index(now), DRIEST)
 
 
 def years(now: Moment) -> np.ndarray:
@@ -190,8 +197,8 @@ ROWS = (
     Observed("fire_mortality_2yr", "disturbance", "1", 0, 1, 0, 1, a_year_ago("fire_mortality_1yr")),
     Observed("insect_mortality_1yr", "disturbance", "1", 0, 1, 0, 1, recorded("insect_mortality")),
     Observed("insect_mortality_2yr", "disturbance", "1", 0, 1, 0, 1, a_year_ago("insect_mortality_1yr")),
-    Observed("drought_index_1yr", "disturbance", "mm", 0, 100, 0, 1e4, recorded("drought_index")),
-    Observed("drought_index_2yr", "disturbance", "mm", 0, 100, 0, 1e4, a_year_ago("drought_index_1yr")),
+    Observed("drought_index_1yr", "disturbance", "mm", 0, 100, 0, DRIEST, drought),
+    Observed("drought_index_2yr", "disturbance", "mm", 0, 100, 0, DRIEST, a_year_ago("drought_index_1yr")),
     Observed("biomass_change", "carbon", "kgC m-2", 0.5, 1.0, -CHANGE, CHANGE, recorded("biomass_change_kgc_m2")),
     Observed("soil_change", "carbon", "kgC m-2", 0.2, 0.4, -CHANGE, CHANGE, recorded("soil_change_kgc_m2")),
     Observed("total_change", "carbon", "kgC m-2", 0.7, 1.4, -CHANGE, CHANGE, recorded("net_carbon_change_kgc_m2")),
