@@ -210,7 +210,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     After 50 years the episode is terminated: nothing is worth anything beyond.
 
     ## Arguments
-    - `mode`: "generalist", which it is unless said, or "site-specific"
+    Where values are named, the first is the default.
+    - `mode`: "generalist" or "site-specific"
     - `years`: length of an episode (50)
     - `time_step_minutes`: a divisor of 1440, at most 120 (30)
     - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (a GPU, for thousands)
@@ -223,7 +224,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `initial_ranges`: first stock -> (low, high), see `sim.INITIAL_RANGES`; biomass is at most 120 kgC a stem,
       and the stems' age follows from it unless `oldest_age_years` has a range
     - `hwp_half_life_years`: half-life of wood products (None: for ever)
-    - `harvest_min_class`: youngest class that may be cut: "young", "mature" or "old"
+    - `harvest_min_class`: youngest class that may be cut: "young" (from 21 years on), "mature" or "old"
     - `reward`: a `Reward`, or a dict of the constants to change
     - `balanced`: whether `carbon_scale`, unless `reward` gives it, is 1.8 (`boreal-balanced-v0`) instead of 2
     - `boundary`: "sampled" with the site, or "balanced" (`boreal-balanced-v0`): the temperature far below is the one
@@ -238,8 +239,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
       warmest day; below 0, winters warm more), `precipitation_factor` and `co2_ppm`, from 2025 on or beside its years
       (a column `year`, the index, or the keys of a dict in a column's place). It is not observed, but the year is,
       and the path is the same in every episode; the climate that is observed stays the site's own
-    - `objectives`: of the reward vector, "carbon", "thaw", "active_layer", "permafrost_heat", "timber", "biodiversity"
-      and any `Objective` of your own
+    - `objectives`: of the reward vector, "carbon", "thaw" (these two), "active_layer", "permafrost_heat", "timber",
+      "biodiversity" and any `Objective` of your own
     - `timber`: prices and costs, which "timber" needs: "finland", "sweden" or "canada" of `sim/timber_prices.csv`, a
       .csv with the same columns, or a dict of all its items in EUR; the record then has the revenue, the last step's
       info the net present value
@@ -249,7 +250,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `observation_groups`: groups of the observation to keep, of `boreal_env.OBSERVATION_GROUPS`, whose order they keep
     - `record_years`: put the annual record into the last step's info, as `info["years"]`
     - `record_steps`: put the year's record into every step's info, as `info["record"]`, a number a column
-    - `render_mode`: "rgb_array" or None
+    - `render_mode`: None or "rgb_array"
 
     ## Reset and Step
     `reset(seed=, options={"preference": w, "site": {name: value}})`; seeds are at most 2^63 - 1, here and everywhere.

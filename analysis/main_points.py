@@ -216,7 +216,7 @@ def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plan
         if len(rows[method]) > 1
     }
     over, even, under = ([method for method, side in beside.items() if side == which] for which in (1, 0, -1))
-    below_it = "all are below it" if len(under) == len(rows) else f"{len(under)} below it"
+    below_it = "all are below 100" if len(under) == len(rows) else f"{len(under)} below 100"
     below_it += f", {methods.title(*best)} too" if best in under and len(under) < len(rows) else ""
     text = (
         f"Of {len(rows)} trained method{'s' if len(rows) > 1 else ''} {methods.title(*best)} scores highest, "
@@ -227,7 +227,7 @@ def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plan
     return text + (
         f" Its score less that of 100 deciduous trees a year is {points(rows[best], deciduous, best_plans)}. "
         f"By both intervals, that of seeds and sites and that of seeds alone by t, {named(over)} above 100"
-        + (f", {named(even)} not told apart from it" if even else "")
+        + (f", {named(even)} not told apart from 100" if even else "")
         + (f", {below_it}" if under else "")
         + f"; {named(above)} above planting half and half; "
         f"{named(below)} below that."

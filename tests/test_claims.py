@@ -136,8 +136,8 @@ def test_how_much_of_the_smallest_effect_a_failing_interval_reaches():
     assert all_of(far, near).reached == pytest.approx(0.2)  # fails until the least effect is smaller than that
     assert np.isnan([above(seeds(-2, -3, -1), least=0.5).reached, above(seeds(2, 1, 3), least=0.5).reached]).all()
     said = summary.counted(Counter({HOLDS: 1, FAILS: 3}), [far.reached, near.reached])
-    assert "3 do not hold" in said and "(1 of them because numbers say otherwise, 2 because" in said
-    assert "if a tenth counted, 1 of these would be open" in said
+    assert "3 do not, and" in said and "1 fail since our numbers say otherwise, and 2 since" in said
+    assert said.endswith("If a tenth counted, 1 of these 2 would be open.")
 
 
 def test_a_verdict_of_the_greedy_policies_says_so():

@@ -23,7 +23,6 @@ from analysis import best_plans, choose_sites, draw_readme, reference_returns, s
 from cleanrl_style import flags, protocol
 from cleanrl_style.protocol import command_line, run_folder
 
-
 SHORT = (
     *("--env-id", "boreal-site-specific-v0", "--vectorization", "lockstep", "--num-envs", 4, "--update-epochs", 1),
     *("--rollout-steps", 200, "--total-timesteps", 200, "--eval-episodes", 1),

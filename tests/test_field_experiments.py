@@ -59,18 +59,24 @@ def test_what_a_constant_should_not_do(after, found):
 
 def test_signs_of_a_made_up_table():
     rows = [
-        ("default", "", "default", -3.0, 1.5, 0.2, 0.5, 0.1),
-        ("a", "1", "constants snow", -3.0, -0.5, 0.2, 0.5, 0.1),
-    ]
-    rows += [
-        ("a", "2", "constants snow", -3.0, 1.6, 0.2, 0.5, 0.1),
-        ("b", "3", "constants soil", 1.0, 1.0, 0.2, 0.4, 0.1),
+        ("paper", "default", "", "default", -3.0, 1.5, 0.2, 0.5, 0.1),
+        ("paper", "a", "1", "constants snow", -3.0, -0.5, 0.2, 0.5, 0.1),
+        ("paper", "a", "2", "constants snow", -3.0, 1.6, 0.2, 0.5, 0.1),
+        ("paper", "b", "3", "constants soil", 1.0, 1.0, 0.2, 0.4, 0.1),
+        ("balanced", "default", "", "default", 1.0, 2.0, 0.2, 1.0, 0.1),
+        ("balanced", "a", "1", "constants snow", 1.0, 2.0, 0.2, 1.0, 0.1),
+        ("balanced", "a", "2", "constants snow", 1.0, 2.0, 0.2, 1.0, 0.1),
+        ("balanced", "b", "3", "constants soil", 1.0, 2.1, 0.2, -1.0, 0.1),
     ]
     columns = ["constant", "value", "group", "zero_change", "conifers", "conifers_se", "deciduous", "deciduous_se"]
-    text, misses = robustness_report.signs_found(pd.DataFrame(rows, columns=columns), 5)
+    text, misses = robustness_report.signs_found(pd.DataFrame(rows, columns=["world", *columns]), 5)
     words = " ".join(text.split())
-    assert "(2 constants, 3 levels" in words and "turn the sign of the effect: 1 of conifers, 0 of deciduous" in words
-    assert [miss.what.split(":")[0] for miss in misses] == ["`a` = 1", "`b` = 3"]
+    assert "(2 constants; steps" in words
+    assert "deciduous trees; 0 change nothing there, so that nothing is said of them. In `balanced` zero" in words
+    assert "the effect: 1 of conifers, 0 of deciduous trees; 0 change" in words
+    assert "the effect: 0 of conifers, 1 of deciduous trees; 1 change" in words
+    missed = [miss.what.split(":")[0] for miss in misses]
+    assert missed == ["`a` = 1, `paper`", "`b` = 3, `paper`", "`b` = 3, `balanced`"]
 
 
 def test_effects_are_paired_by_site():

@@ -102,7 +102,7 @@ def test_the_words_follow_from_the_numbers(results):
     assert ahead == (
         "Of 5 trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds and a gain hypervolume "
         "of 2.50. Its score less that of 100 deciduous trees a year is 15.0. By both intervals, that of seeds and "
-        "sites and that of seeds alone by t, Group PPO is above 100, 3 below it; Group PPO is above planting "
+        "sites and that of seeds alone by t, Group PPO is above 100, 3 below 100; Group PPO is above planting "
         "half and half; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
     )
     assert followed == (

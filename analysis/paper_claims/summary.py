@@ -113,10 +113,11 @@ def counted(verdicts: Counter, reached: list[float]) -> str:
     open_ = verdicts.total() - verdicts[HOLDS] - verdicts[FAILS]
     numbers = verdicts[FAILS] - small
     return (
-        f"Of the {verdicts.total()} facts about what comes out ahead or which way a mechanism works {verdicts[HOLDS]} "
-        f"hold here, {verdicts[FAILS]} do not hold in our simulator ({numbers} of them because numbers say otherwise, "
-        f"{small} because no effect large enough to count, a quarter, is left; if a tenth counted, {open_by_less} of "
-        f"these would be open), and {open_} are open or cannot be tested."
+        f"The paper states {verdicts.total()} facts about what comes out ahead or which way a mechanism works. Here "
+        f"{verdicts[HOLDS]} hold, {verdicts[FAILS]} do not, and {open_} are open or cannot be tested. Of the "
+        f"{verdicts[FAILS]} that do not, {numbers} fail since our numbers say otherwise, and {small} since what is "
+        f"left of the effect is too small: less than a quarter of what [its rule](#how-it-is-judged) measures it by. "
+        f"If a tenth counted, {open_by_less} of these {small} would be open."
     )
 
 

@@ -3,9 +3,10 @@
     python analysis/studies/planting_signs.py
 
 Every literature constant at the two levels of `sensitivity.py`, one at a time, on a few sites that span what is
-sampled: zero change, and planting 100 stems a year of conifers or of deciduous trees. All else is held, dice included;
-nothing burns and no insects come, so that no difference is luck. Leaves results/studies/planting_signs.csv, a row a
-level; until then a group of constants is one table beside it, and a command that was stopped goes on with the next.
+sampled, in the paper's world and in the balanced one: zero change, and planting 100 stems a year of conifers or of
+deciduous trees. All else is held, dice included; nothing burns and no insects come, so that no difference is luck.
+Leaves results/studies/planting_signs.csv, a row a world and level; until then a group of constants is one table beside
+it, and a command that was stopped goes on with the next.
 """
 
 import sys
@@ -23,10 +24,12 @@ from analysis.studies.sensitivity import DEFAULT, Variant
 from cleanrl_style import protocol
 from cleanrl_style.protocol import reference
 from sim.stands import available_cores
+from sim.task.episodes import BALANCED_WORLD
 
 YEARS = 50
 SITES = 5  # with three plans they fill a block of sixteen lanes
 PLANS = {"zero change": 12, "conifers": 24, "deciduous": 20}
+WORLDS = {"boreal-generalist-v0": {}, "boreal-balanced-v0": BALANCED_WORLD}
 UNDISTURBED = {"fire": False, "insects": False}
 
 
@@ -44,7 +47,7 @@ class Args:
     """2 sites, 2 years, the constants of snow: to see that it runs, into results/quick/studies"""
 
 
-def play(variant: Variant, sites: int, years: int) -> dict:
+def play(world: str, variant: Variant, sites: int, years: int) -> dict:
     """Mean over sites of the thaw return of zero change and of what planting adds to it, with standard errors."""
     numbers = open_loop.spanning_sites(sites)
     design = [(number, plan) for number in numbers for plan in PLANS.values()]
@@ -55,10 +58,11 @@ def play(variant: Variant, sites: int, years: int) -> dict:
         constants=variant.constants,
         mechanisms=UNDISTURBED,
         threads=1,
+        **WORLDS[world],
     )
     returns = episodes.returns()[:, 1].reshape(sites, len(PLANS))
-    row = {"constant": variant.factor, "level": variant.level, "value": variant.value, "group": variant.group}
-    return row | effects(returns)
+    row = {"world": world, "constant": variant.factor, "level": variant.level, "value": variant.value}
+    return row | {"group": variant.group} | effects(returns)
 
 
 def effects(returns: np.ndarray) -> dict[str, float]:
@@ -78,10 +82,11 @@ def variants() -> list[Variant]:
 
 
 def play_all(chosen: list[Variant], args: Args, played) -> pd.DataFrame:
-    """The variants side by side, one a core; `played` is called after each."""
+    """The variants in each world side by side, one a core; `played` is called after each."""
+    cases = [(world, variant) for world in WORLDS for variant in chosen]
     with ThreadPoolExecutor(available_cores()) as pool:
         rows = []
-        for row in pool.map(lambda variant: play(variant, args.sites, args.years), chosen):
+        for row in pool.map(lambda case: play(*case, args.sites, args.years), cases):
             rows.append(row)
             played()
     return pd.DataFrame(rows)
@@ -90,7 +95,8 @@ def play_all(chosen: list[Variant], args: Args, played) -> pd.DataFrame:
 def settings(args: Args) -> dict:
     """What a table hangs on; another simulator or step makes it stale."""
     physics = reference.physics_name()
-    return {"sites": args.sites, "years": args.years, "share": sensitivity.SHARE, "physics": physics}
+    worlds = ", ".join(WORLDS)
+    return {"worlds": worlds, "sites": args.sites, "years": args.years, "share": sensitivity.SHARE, "physics": physics}
 
 
 def path(quick: bool = False) -> Path:
@@ -115,8 +121,9 @@ def main(args: Args) -> None:
     if not args.names and stored.is_finished(table, made_by):
         print(f"{table} is finished")
         return
-    progress = protocol.Progress("planting_signs", len(everything), "levels")
-    done = iter(range(1, len(everything) + 1))
+    total = len(WORLDS) * len(everything)
+    progress = protocol.Progress("planting_signs", total, "levels")
+    done = iter(range(1, total + 1))
     if args.names:
         print(
             play_all(everything, args, lambda: progress.show(next(done))).to_string(index=False, float_format="%+.2f")
@@ -129,7 +136,7 @@ def main(args: Args) -> None:
     parts = {group: table.with_name(f"{table.stem}_{group.replace(' ', '_')}.csv") for group in groups}
     for group, of in groups.items():
         if stored.is_finished(parts[group], made_by):
-            for _ in of:
+            for _ in range(len(WORLDS) * len(of)):
                 progress.show(next(done))
         else:
             stored.write(parts[group], play_all(of, args, lambda: progress.show(next(done))), made_by)

@@ -265,7 +265,9 @@ def page(table: pd.DataFrame) -> str:
 Written by `python analysis/studies/sensitivity.py`; not to be edited. Every site parameter at the low and the high end
 of its sampled range, and every literature constant {SHARE:.0%} below and above its value, one at a time:
 50-year returns on {SITES} sites that span what is sampled (weathers on each: {WEATHERS}), everything else held,
-the dice included. The sites start with their own stands. Planting is 100 stems/ha a year wherever that can be
+the dice included. The world is the paper's, `boreal-generalist-v0`: what only `boreal-balanced-v0` uses
+(`noise_factor_*`, `wet_day_factor`, `wind_spread`, `*_observed_*`) cannot act in it, so that its zeros say nothing of
+that task. The sites start with their own stands. Planting is 100 stems/ha a year wherever that can be
 done. What was measured:
 
 | | | at the default |
@@ -281,10 +283,11 @@ The mean annual temperature follows
 the latitude, as it does when a site is sampled. A range and {SHARE:.0%} are not alike: compare parameters with
 parameters and constants with constants.
 
-Where the thaw reward is clipped at -1 in every year, as at one of the four sites, its effects are nearly zero,
-and means over sites are smaller for it. Nothing burned in the one weather: zeros of fire's parameters say nothing about
-how much they matter. There are no error estimates: read sizes, not second digits, and no ranks of `species_thaw`, which
-differs more between sites and dice than by most factors.
+Where the thaw reward is clipped at -1 in every year, as at one of the four sites, its effects are nearly zero, and
+means over sites are smaller for it. Nothing burned in the one weather, nothing was cut, and no stand thinned itself:
+zeros of fire, of products and of crowding say nothing about how much they matter. There are no error estimates: read
+sizes, not second digits, and no ranks of `species_thaw`, which differs more between sites and dice than by most
+factors.
 
 ## Alternatives
 

@@ -15,6 +15,8 @@ from sim.task.episodes import BALANCED_WORLD
 YEARS, QUICK_YEARS = 50, 10
 SPAN = "sites that span the sampled"  # where a constant, not the simulator against what was measured, is looked at
 PLANS = {"zero change": 12, "+100 conifers": 24, "+100 deciduous": 20, "−100": 2}
+EFFECTS = ["zero_change", "conifers", "deciduous"]
+NOTHING = 1e-9  # of a return
 ZERO_CHANGE = Band(-3.0, 3.0)  # how far a constant moved by 10 % may move the return of zero change
 
 #: Name -> arguments of `sim.Stands`.
@@ -133,40 +135,51 @@ def _signs(quick: bool) -> tuple[str, list[Miss]]:
 def signs_found(table: pd.DataFrame, sites: int) -> tuple[str, list[Miss]]:
     """Text and misses: constants that turn the sign of planting's effect, or move zero change too far.
 
-    table : of `planting_signs.py`, a row a constant and level, the first of them the default.
+    table : of `planting_signs.py`, a row a world, constant and level, the first of each world the default.
     """
-    columns = ["zero_change", "conifers", "deciduous"]
-    default = table[table.constant == "default"].iloc[0]
-    before = tuple(default[columns])
-    levels = table[table.constant != "default"]
-    rows, misses = [], []
-    for level in levels.itertuples():
-        after = (level.zero_change, level.conifers, level.deciduous)
-        found = problems(before, after)
-        if not found:
-            continue
-        values = [number(value, 2, sign=True) for value in after]
-        rows.append([f"`{level.constant}`", level.value, *values, ", ".join(found)])
-        misses.append(
-            Miss(
-                SPAN,
-                f"`{level.constant}` = {level.value}: {', '.join(found)}",
-                level.group.removeprefix("constants "),
+    rows, misses, of_worlds = [], [], []
+    for world, of_world in table.groupby("world", sort=False):
+        default = of_world[of_world.constant == "default"].iloc[0]
+        before = tuple(default[EFFECTS])
+        levels = of_world[of_world.constant != "default"]
+        of_worlds.append(f"In `{world}` {_of_world(default, levels)}")
+        for level in levels.itertuples():
+            after = (level.zero_change, level.conifers, level.deciduous)
+            found = problems(before, after)
+            if not found:
+                continue
+            values = [number(value, 2, sign=True) for value in after]
+            rows.append([f"`{world}`", f"`{level.constant}`", level.value, *values, ", ".join(found)])
+            misses.append(
+                Miss(
+                    SPAN,
+                    f"`{level.constant}` = {level.value}, `{world}`: {', '.join(found)}",
+                    level.group.removeprefix("constants "),
+                )
             )
-        )
-    effects = [
+    header = ["world", "constant", "value", "zero change", "conifers", "deciduous", "what turns or moves"]
+    listed = document.table(header, rows, left=7) if rows else "No constant does either."
+    count = table[table.constant != "default"].constant.nunique()
+    text = f"""Every constant 10 % below and above its value ({count} constants; steps as in
+[sensitivity.md](sensitivity.md)), one at a time, in both worlds, on {sites} sites that span what is sampled, without
+fire and insects. {" ".join(of_worlds)} Listed are constants that turn a sign, and those that move zero change by more
+than {number(ZERO_CHANGE.high, 0)}.
+
+{listed}"""
+    return text, misses
+
+
+def _of_world(default: pd.Series, levels: pd.DataFrame) -> str:
+    """What planting does there, and how many constants turn it or change nothing."""
+    added = [
         f"{number(default[name], 2, sign=True)} ± {number(default[f'{name}_se'], 2)} ({name})"
         for name in ("conifers", "deciduous")
     ]
     turned = {name: levels[levels[name] * default[name] < 0.0].constant.nunique() for name in ("conifers", "deciduous")}
-    header = ["constant", "value", "zero change", "conifers", "deciduous", "what turns or moves"]
-    listed = document.table(header, rows, left=6) if rows else "No constant does either."
-    text = f"""Every constant 10 % below and above its value ({levels.constant.nunique()} constants, {len(levels)}
-levels; steps as in [sensitivity.md](sensitivity.md)), one at a time, on {sites} sites that span what is sampled,
-without fire and insects. At the values in use zero change returns {number(default.zero_change, 2, sign=True)}, and
-planting adds {" and ".join(effects)}. Constants that turn the sign of the effect: {turned["conifers"]} of
-conifers, {turned["deciduous"]} of deciduous trees. Listed are these, and those that move zero change by more than
-{number(ZERO_CHANGE.high, 0)}.
-
-{listed}"""
-    return text, misses
+    alike = (levels[EFFECTS] - default[EFFECTS].astype(float)).abs().max(axis=1) < NOTHING
+    inert = int(alike.groupby(levels.constant).all().sum())
+    return (
+        f"zero change returns {number(default.zero_change, 2, sign=True)}, and planting adds {' and '.join(added)}. "
+        f"Constants that turn the sign of the effect: {turned['conifers']} of conifers, {turned['deciduous']} of "
+        f"deciduous trees; {inert} change nothing there, so that nothing is said of them."
+    )
