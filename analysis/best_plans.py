@@ -187,17 +187,11 @@ def main(args: Args) -> None:
         todo = [seed for seed in seeds if seed not in there]
         print(f"{task.env_id}: {len(seeds) - len(todo)} of {len(seeds)} sites are in {path}", flush=True)
         protocol.compile_physics(lanes_of(task, len(first_plans())))
-        progress, done = protocol.Progress("best plans", args.budget * len(todo), "episodes"), 0
-
-        def played(number, progress=progress):
-            nonlocal done
-            done += number
-            progress.show(done)
-
+        progress = protocol.Progress("best plans", args.budget * len(todo), "episodes")
         for k, seed in enumerate(todo):
-            tables.append(study(task, seed, args.budget, args.seed, played))
+            tables.append(study(task, seed, args.budget, args.seed, progress.add))
             stored.write(path, pd.concat(tables), settings)
-            done = (k + 1) * args.budget
+            progress.done = (k + 1) * args.budget
         table = pd.concat(tables, ignore_index=True)
         table = table[table.seed.isin(seeds)]
         print(summary(table, weights_of(task)).to_string(float_format="%.2f"))

@@ -48,11 +48,6 @@ class Job:
         return f"analysis/studies/{self.script}.py" if self.is_study else METHODS[self.script].path
 
     @property
-    def exists(self) -> bool:
-        """Whether the project has the script."""
-        return (ROOT / self.path).exists()
-
-    @property
     def is_study(self) -> bool:
         """Whether it is a study of `analysis`, which leaves a table, not a run."""
         return self.script in STUDIES
@@ -329,7 +324,7 @@ QUICK_ROUND = {"total_timesteps": 4200}  # of plan regression, which plays 21 pl
 QUICK_EVALUATION = {"eval_episodes": 2, "eval_weights": (0.0, 0.5, 1.0)}
 
 
-def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path | None = None) -> list[Job]:
+def quick_jobs(only=tuple(EXPERIMENTS)) -> list[Job]:
     """Every script of every experiment, in seconds: one seed, the first of its settings, the outer weights."""
     small, seen = [], set()
     for number, job in enumerate(jobs(seeds=[1])):  # numbered the same whatever is asked for
@@ -352,6 +347,6 @@ def quick_jobs(only=tuple(EXPERIMENTS), runs_dir: Path | None = None) -> list[Jo
             flags["eval_weights"] = tuple(float(one == other) for one in names for other in names)
         if "preference" in flags:
             del flags["eval_weights"]  # an agent of one weight is evaluated at it
-        flags["run_dir"] = (runs_dir or paths.runs(quick=True)) / f"{number:02d}-{job.script}"
+        flags["run_dir"] = paths.runs(quick=True) / f"{number:02d}-{job.script}"
         small.append(Job(job.experiment, job.script, flags))
     return small

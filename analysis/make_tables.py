@@ -9,8 +9,7 @@ A table without a number of ours is not written, and what an earlier call left o
 Runs are recognised by their config.json, never by the name of their folder. Runs of one script that differ only in
 the seed form one row: the metrics are computed for each run, then aggregated over training seeds (interquartile mean,
 95 % bootstrap interval). The main table has the score of the greedy and of the sampled policy; all other numbers are of
-the one that is primary: greedy, or in older runs, whose config.json does not say, sampled. A column "sd over episodes"
-is the paper's kind of +-.
+the greedy one. A column "sd over episodes" is the paper's kind of +-.
 """
 
 import sys
@@ -83,7 +82,7 @@ def name_of(table) -> str:
 def say_what_is_missing(results: Results) -> None:
     """Print how many rows and studies of the project's experiments are not there, and the first commands of them."""
     rows = {job.row: job for job in reversed(results.missing)}
-    commands = [job.command for job in reversed(rows.values()) if job.exists]
+    commands = [job.command for job in reversed(rows.values())]
     studies = [job for job in results.jobs if job.is_study and results.study(job.script) is None]
     commands += [job.command for job in studies]
     if commands:
@@ -91,9 +90,6 @@ def say_what_is_missing(results: Results) -> None:
         print("\n".join(f"  {line}" for line in commands[:SHOWN]))
         more = f"  and {len(commands) - SHOWN} more; " if len(commands) > SHOWN else "  "
         print(f"{more}`python analysis/reproduce.py --list` names all, without --list makes them")
-    without_script = dict.fromkeys(job.script for job in results.missing if not job.exists)
-    if without_script:
-        print(f"No script yet for {', '.join(without_script)}.")
 
 
 def say_what_was_not_run(what: str, lines: list[str]) -> None:
@@ -119,7 +115,7 @@ def main(args: Args) -> None:
         of = f"{len(mixed)} of {len(results.runs)} runs were begun with one code and went on with another"
         print(f"{of}, such as {mixed[0].folder} (begun_with in config.json)", file=sys.stderr)
     if not results.runs:
-        where, first = ", ".join(map(str, results.roots)), next(job.command for job in results.missing if job.exists)
+        where, first = ", ".join(map(str, results.roots)), results.missing[0].command
         protocol.fail(f"no finished run under {where}; `{first}` makes the first, `python analysis/reproduce.py` all")
     folder = args.tables_dir or paths.runs(args.quick) / "tables"
     paths.make_writable("--tables-dir", folder)

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 
 from cleanrl_style.protocol import EPISODE_INFO, fronts
-from cleanrl_style.protocol.evaluation import EVALUATION_INFO
+from cleanrl_style.protocol.evaluation import EVALUATION_INFO, PRIMARY
 from sim.demography import AGE_CLASSES
 
 BINS = 40
@@ -49,17 +49,17 @@ FLOAT_FORMAT = "%.6g"
 FLOAT_FORMATS = {"timing": "%.12g", "learning": "%.12g"}  # differences of statistics need more digits
 
 
-def reduce(tables: dict[str, pd.DataFrame], steps: int | None, primary: str) -> dict[str, pd.DataFrame]:
+def reduce(tables: dict[str, pd.DataFrame], steps: int | None) -> dict[str, pd.DataFrame]:
     """A run's own tables by name, those that it has, as the tables that are kept of it.
 
-    steps : of its training; None for a fixed strategy. primary : the policy that its results are about
+    steps : of its training; None for a fixed strategy.
     """
-    kept = {"evaluation": evaluation(tables["evaluation"], primary), "timing": timing(tables["timing"])}
+    kept = {"evaluation": evaluation(tables["evaluation"]), "timing": timing(tables["timing"])}
     if "cost" in tables:
         kept["cost"] = tables["cost"]
     if "evaluation_years" in tables:
         record = tables["evaluation_years"]
-        record = record[record.policy == primary].drop(columns="policy")
+        record = record[record.policy == PRIMARY].drop(columns="policy")
         kept |= {"years": years(record), "last_year": last_year(record)}
     if "episodes" in tables:
         episodes = tables["episodes"]
@@ -86,11 +86,11 @@ def parse(text: str) -> pd.DataFrame:
 # ---------------------------------------------------------------------------------------------- evaluation
 
 
-def evaluation(table: pd.DataFrame, primary: str) -> pd.DataFrame:
+def evaluation(table: pd.DataFrame) -> pd.DataFrame:
     """All episodes, without their number, which their seed gives; EVALUATION_INFO of the primary policy alone."""
     info = [name for name in EVALUATION_INFO if name in table]
     table = table.drop(columns="episode")
-    table[info] = table[info].where(table.policy == primary)
+    table[info] = table[info].where(table.policy == PRIMARY)
     return table
 
 

@@ -92,9 +92,6 @@ def main(args: Args) -> None:
     if args.list:
         print("\n".join(job.command for job in jobs))
         return
-    for script in dict.fromkeys(job.script for job in jobs if not job.exists):
-        print(f"no script yet: {script}.py; its jobs are left out", file=sys.stderr)
-    jobs = [job for job in jobs if job.exists]
     libraries = [name for name in ("morl_baselines", "sb3_contrib") if importlib.util.find_spec(name) is None]
     if libraries and any(job.script in methods.OUTSIDE for job in jobs):
         jobs = [job for job in jobs if job.script not in methods.OUTSIDE]

@@ -11,6 +11,7 @@ from analysis import experiments, methods, metrics, paths, reduction, runs, stor
 from analysis.studies.constant_plans import of_environment
 from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
+from cleanrl_style.protocol.evaluation import PRIMARY
 from cleanrl_style.protocol.run_folder import as_text
 
 PAIR = ["carbon", "thaw"]  # the paper's objectives
@@ -161,13 +162,13 @@ class Results:
             policy: pd.concat([run.of_policy(policy) for run in its_runs], ignore_index=True)
             for policy in protocol.POLICIES
         }
-        return self.replicate(its_runs, by_policy, its_runs[0].primary, **conditions)
+        return self.replicate(its_runs, by_policy, **conditions)
 
-    def replicate(self, its_runs, by_policy, primary, env_id, **conditions) -> Replicate:
+    def replicate(self, its_runs, by_policy, env_id, **conditions) -> Replicate:
         """A replicate of evaluations by policy, with its gains if they are known."""
         gained = {policy: self.gains(table, env_id, **conditions) for policy, table in by_policy.items()}
-        plans = None if gained[primary] is None else self.plans(by_policy[primary], env_id, **conditions)
-        return Replicate(its_runs, by_policy[primary], gained[primary], gained, plans)
+        plans = None if gained[PRIMARY] is None else self.plans(by_policy[PRIMARY], env_id, **conditions)
+        return Replicate(its_runs, by_policy[PRIMARY], gained[PRIMARY], gained, plans)
 
     def plans(self, evaluation, env_id, thaw_formulation="asymmetric", site_seed=None) -> pd.DataFrame | None:
         """Gains of the constant plans on an evaluation's episodes; None if they were not evaluated on them."""

@@ -14,6 +14,7 @@ import pandas as pd
 
 from analysis import paths, reduction
 from cleanrl_style.protocol import files, fronts
+from cleanrl_style.protocol.evaluation import POLICIES, PRIMARY
 from cleanrl_style.protocol.reference import physics_name
 from cleanrl_style.protocol.run_folder import as_text
 
@@ -50,14 +51,9 @@ class Run:
         return self.config["arguments"]
 
     @property
-    def primary(self) -> str:
-        """The policy that its results are about."""
-        return primary_of(self.config)
-
-    @property
     def evaluation(self) -> pd.DataFrame:
         """The episodes of the primary policy."""
-        return self.of_policy(self.primary)
+        return self.of_policy(PRIMARY)
 
     def of_policy(self, policy: str) -> pd.DataFrame:
         """The episodes of one policy."""
@@ -78,11 +74,6 @@ class Run:
         """Share of a curriculum's episodes that it was trained on."""
         (row,) = self.tables["selection"].itertuples()
         return row.selected / row.episodes
-
-
-def primary_of(config: dict) -> str:
-    """The policy that a run's results are about: it is written down since it is the greedy one."""
-    return config.get("primary_policy", "sampled")
 
 
 def setting(not_default: dict, mode: str) -> str:
@@ -188,7 +179,7 @@ def read_run(folder: Path | str) -> Run:
     check(tables["evaluation"], config)
     if steps is not None:
         check_training(tables, config["arguments"])
-    return Run(folder, config, reduction.reduce(tables, steps, primary_of(config)))
+    return Run(folder, config, reduction.reduce(tables, steps))
 
 
 def check(evaluation: pd.DataFrame, config: dict) -> None:
@@ -198,14 +189,18 @@ def check(evaluation: pd.DataFrame, config: dict) -> None:
     missing = [name for name in needed if name not in evaluation]
     if missing:
         raise ValueError(f"damaged: evaluation.csv with the returns of {objectives} lacks the column {missing[0]}")
-    arguments, primary = config["arguments"], primary_of(config)
-    evaluation = evaluation[evaluation.policy == primary]
+    for policy in POLICIES:
+        check_policy(evaluation[evaluation.policy == policy], policy, config["arguments"], objectives)
+
+
+def check_policy(evaluation: pd.DataFrame, policy: str, arguments: dict, objectives: list[str]) -> None:
+    """ValueError if the episodes of a policy are not whole."""
     expected = len(arguments["eval_weights"]) * arguments["eval_episodes"]
     # on the fixed site every greedy episode is the first again, and one may stand for all
-    alike = primary == "greedy" and arguments["mode"] == "site-specific"
+    alike = policy == "greedy" and arguments["mode"] == "site-specific"
     if len(evaluation) != expected and not (alike and len(evaluation) == len(arguments["eval_weights"])):
         raise ValueError(
-            f"damaged: evaluation.csv has {len(evaluation)} episodes of the {primary} policy, not {expected}"
+            f"damaged: evaluation.csv has {len(evaluation)} episodes of the {policy} policy, not {expected}"
         )
     episodes = evaluation.groupby(fronts.weight_columns(objectives)).seed.nunique()
     if len(episodes) != len(arguments["eval_weights"]) or episodes.nunique() != 1:

@@ -487,12 +487,11 @@ def main(args: Args) -> None:
     protocol.compile_physics([LANES])
     numbers = plan(args.stand_years)
     progress = protocol.Progress("stress", sum(map(planned_years, numbers)), "stand-years")
-    began, done, outcomes = perf_counter(), 0, []
+    began, outcomes = perf_counter(), []
     with ThreadPoolExecutor(args.threads) as pool:
         for outcome in pool.map(lambda number: run_batch(args.seed, number), numbers):
             outcomes.append(outcome)
-            done += planned_years(outcome.number)
-            progress.show(done)
+            progress.add(planned_years(outcome.number))
     seconds = perf_counter() - began
 
     table = tabulate(outcomes)

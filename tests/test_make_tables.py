@@ -402,13 +402,13 @@ def test_the_score_of_both_policies(tmp_path, monkeypatch):
     monkeypatch.setattr(paths, "studies", lambda quick: tmp_path / "studies")
     table = make(tmp_path / "runs", tmp_path / "tables")
     row = table.loc[("ppo_gated", MAIN[1], "default")]
-    # gains 4, 0.5 or 1, 2 of the sampled policy, of 4, 2, 2
-    assert row.primary == "sampled" and row.score_sampled == pytest.approx(100 * (6.5 + 7) / 2 / 8)
-    assert row.score_sampled_low <= row.score_sampled <= row.score_sampled_high
-    assert row.score_greedy == pytest.approx(row.score_sampled + 100 * 100 * 3 / 8)  # 100 more of both returns
+    # gains 4, 0.5 or 1, 2 of the greedy policy, of 4, 2, 2
+    assert row.score_greedy == pytest.approx(100 * (6.5 + 7) / 2 / 8)
+    assert row.score_greedy_low <= row.score_greedy <= row.score_greedy_high
+    assert row.score_sampled == pytest.approx(row.score_greedy + 100 * 100 * 3 / 8)  # 100 more of both returns
     assert row.gain_scalarized == pytest.approx((6.5 + 7) / 6) and row.seeds_to_tell == 23
-    assert table.score_sampled["best_constant_mix", MAIN[1], "default"] == pytest.approx(100)
-    assert table.score_sampled["zero_change"].dropna().tolist() == [0]
+    assert table.score_greedy["best_constant_mix", MAIN[1], "default"] == pytest.approx(100)
+    assert table.score_greedy["zero_change"].dropna().tolist() == [0]
 
 
 def test_what_a_choice_is_worth(tmp_path):
@@ -456,12 +456,12 @@ def test_shares_of_the_best_known_plans(tmp_path, monkeypatch):
     monkeypatch.setattr(paths, "studies", lambda quick: tmp_path / "studies")
     make(runs, tmp_path / "tables")
     table = read(tmp_path / "tables", "best_known", ["method", "policy"])
-    row = table.loc[("ppo_gated", "sampled")]
+    row = table.loc[("ppo_gated", "greedy")]
     assert (row.seeds, row.sites) == (2, 1)
     assert row[["share_0", "share_0.25", "share_1"]].tolist() == pytest.approx([100 * 1.5 / 4, 0, 50])
     assert row.share == pytest.approx(100 * (1.5 + 1) / (4 + 3 + 2 + 1.5 + 2))
-    # greedy has 100 more of both, sampled only ends
-    assert table.loc[("ppo_gated", "greedy")].nhgr == 1 and row.nhgr == 0
+    # sampled has 100 more of both, greedy only ends
+    assert table.loc[("ppo_gated", "sampled")].nhgr == 1 and row.nhgr == 0
     assert 0 < row.eugr < 1
     for name in best_known.BLIND:
         assert table.xs(name).iloc[0][["share_0", "share_1"]].tolist() == pytest.approx([0, 50])

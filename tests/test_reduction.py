@@ -90,8 +90,8 @@ def test_only_the_primary_policy_has_more_than_returns():
     table = pd.DataFrame(
         {"policy": ["greedy", "sampled"], "episode": 0, "carbon_return": 1.0, "latent_heat_mj_m2": 2.0}
     )
-    kept = reduction.evaluation(table, "sampled")
-    assert "episode" not in kept and kept.latent_heat_mj_m2.isna().tolist() == [True, False]
+    kept = reduction.evaluation(table)
+    assert "episode" not in kept and kept.latent_heat_mj_m2.isna().tolist() == [False, True]
 
 
 def test_steps_that_a_killed_run_made_twice_are_timed_once():

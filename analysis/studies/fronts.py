@@ -223,20 +223,12 @@ def main(args: Args) -> None:
     print(f"{sum(finished.values())} of {len(todo)} fronts are there, in {folder}", flush=True)
     each = most_episodes(budget)
     progress = protocol.Progress("fronts", each * (len(todo) - sum(finished.values())), "episodes")
-    done = 0
-
-    def played(number):
-        nonlocal done
-        done += number
-        progress.show(done)
-
     for k, case in enumerate(case for case in todo if not finished[case]):
         site_seed, mechanism = case
         switches = None if mechanism == ALL_ON else {mechanism: False}
-        table = study(site_seed, budget, args.seed, YEARS, switches, played)
+        table = study(site_seed, budget, args.seed, YEARS, switches, progress.add)
         stored.write(path_of(folder, *case), table, settings | {"case": case})
-        done = (k + 1) * each
-        progress.show(done)
+        progress.add((k + 1) * each - progress.done)  # a search may play fewer
 
     rows = [
         {

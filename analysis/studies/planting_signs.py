@@ -123,11 +123,8 @@ def main(args: Args) -> None:
         return
     total = len(WORLDS) * len(everything)
     progress = protocol.Progress("planting_signs", total, "levels")
-    done = iter(range(1, total + 1))
     if args.names:
-        print(
-            play_all(everything, args, lambda: progress.show(next(done))).to_string(index=False, float_format="%+.2f")
-        )
+        print(play_all(everything, args, progress.add).to_string(index=False, float_format="%+.2f"))
         return
 
     groups: dict[str, list[Variant]] = {}
@@ -137,9 +134,9 @@ def main(args: Args) -> None:
     for group, of in groups.items():
         if stored.is_finished(parts[group], made_by):
             for _ in range(len(WORLDS) * len(of)):
-                progress.show(next(done))
+                progress.add()
         else:
-            stored.write(parts[group], play_all(of, args, lambda: progress.show(next(done))), made_by)
+            stored.write(parts[group], play_all(of, args, progress.add), made_by)
     whole = pd.concat([stored.read(part, text=("value",)) for part in parts.values()], ignore_index=True)
     stored.write(table, whole, made_by)
     for part in parts.values():

@@ -341,8 +341,7 @@ def main(args: Args) -> None:
             )
         chosen = [variant for variant in everything if variant.factor in ("default", *args.names)]
         progress = protocol.Progress("sensitivity", len(chosen), "variants")
-        done = iter(range(1, len(chosen) + 1))
-        table = play_all(chosen, site_seeds, lambda number: progress.show(next(done)))
+        table = play_all(chosen, site_seeds, progress.add)
         print(measures(table).to_string(float_format="%+.3f"))
         print(effects(table).to_string(float_format="%+.3f", index=False))
         return
@@ -366,15 +365,8 @@ def main(args: Args) -> None:
     todo = [group for group in groups if not stored.is_finished(paths[group], made_by[group])]
     print(f"{len(groups) - len(todo)} of {len(groups)} groups are there, in {args.output_dir}", flush=True)
     progress = protocol.Progress("sensitivity", sum(len(groups[group]) for group in todo), "variants")
-    done = 0
-
-    def played(number):
-        nonlocal done
-        done += number
-        progress.show(done)
-
     for group in todo:
-        stored.write(paths[group], play_all(groups[group], site_seeds, played), made_by[group])
+        stored.write(paths[group], play_all(groups[group], site_seeds, progress.add), made_by[group])
     table = pd.concat([stored.read(path, text=("value",)) for path in paths.values()], ignore_index=True)
     stored.write(args.output_dir / "effects.csv", effects(table), settings)
     with protocol.replacing(args.document) as file:

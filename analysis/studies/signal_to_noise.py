@@ -351,16 +351,9 @@ def study(design: Design, years: int) -> tuple[pd.DataFrame, pd.DataFrame]:
     arms = len(REFERENCES) * design.sites * design.pasts * design.futures * len(ACTIONS)
     most = arms * sum(years - year for year in design.years) + arms // len(REFERENCES) * years
     progress = protocol.Progress("effects", most, "stand-years at most")
-    done = 0
-
-    def played(number):
-        nonlocal done
-        done += number
-        progress.show(done)
-
     states = pasts(design)
-    cases = [((ALONE, EVERY), play_every_year(design, years, states[0], played))]
-    for year, rewards in play(design, years, states, played).items():
+    cases = [((ALONE, EVERY), play_every_year(design, years, states[0], progress.add))]
+    for year, rewards in play(design, years, states, progress.add).items():
         cases += [((reference, str(year)), rewards[k]) for k, reference in enumerate(REFERENCES)]
     return analyse(cases)
 

@@ -126,11 +126,9 @@ def main(args: Args) -> None:
         print(f"{path(args.quick)} is finished")
         return
     chunks = -(-sites * dice * len(PLANS) // CHUNK) * len(TASKS)
-    progress, done = protocol.Progress("site_choice", chunks, "chunks"), iter(range(1, chunks + 1))
+    progress = protocol.Progress("site_choice", chunks, "chunks")
     every = {site: range(site * dice, (site + 1) * dice) for site in range(sites)}
-    rows = [
-        row for task in TASKS for row in summarise(task, play(task, every, years, lambda: progress.show(next(done))))
-    ]
+    rows = [row for task in TASKS for row in summarise(task, play(task, every, years, progress.add))]
     table = pd.DataFrame(rows)
     stored.write(path(args.quick), table, made_by)
     print(table[["task", "weight", *WAYS]].round(2).to_string(index=False) + f"\nwrote {path(args.quick)}")

@@ -100,10 +100,10 @@ def main(args: Args) -> None:
     dice = {site: [others + site] for site in range(site_choice.SITES, site_choice.SITES + sites)}
     parameters = [list(sim.sample_site(open_loop.FIRST_SITE_SEED + site).values()) for site in dice]
     chunks = -(-sites * len(site_choice.PLANS) // site_choice.CHUNK) * len(site_choice.TASKS)
-    progress, done = protocol.Progress("site_regression", chunks, "chunks"), iter(range(1, chunks + 1))
+    progress = protocol.Progress("site_regression", chunks, "chunks")
     rows = []
     for task in site_choice.TASKS:
-        gains = site_choice.play(task, dice, years, lambda: progress.show(next(done)))[:, :, 0]
+        gains = site_choice.play(task, dice, years, progress.add)[:, :, 0]
         rows += summarise(task, np.array(parameters), gains)
     table = pd.DataFrame(rows)
     stored.write(path(args.quick), table, made_by)

@@ -2,8 +2,8 @@
 
 The score is 100 x the gain over doing nothing, over that of the best constant plan of each weight. Score and gain have
 intervals over training seeds and evaluation sites together, the rest over training seeds. `seeds to tell 0.1` is how
-many a method it takes to tell another apart whose gain differs by so much. All but the two scores is of the policy
-named `primary`.
+many a method it takes to tell another apart whose gain differs by so much. All but the sampled score is of the
+greedy policy.
 """
 
 import numpy as np
@@ -13,7 +13,6 @@ from analysis import metrics
 from analysis.studies.constant_plans import CONIFERS, DECIDUOUS, ENVIRONMENTS, as_evaluation
 from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
 from cleanrl_style import protocol
-from cleanrl_style.protocol.evaluation import PRIMARY
 from cleanrl_style.protocol.fronts import evaluation_weights
 
 MADE_BY = "python analysis/reproduce.py --only main"
@@ -24,7 +23,6 @@ CONSTANT_PLANS = {
     "best_constant_mix": ("best constant plan of each weight", None),
 }
 COLUMNS = ROW_COLUMNS | {
-    "primary": "primary",
     "score_greedy": "score, greedy",
     "score_sampled": "score, sampled",
     "gain_scalarized": "gain",
@@ -139,9 +137,7 @@ def row_of_runs(key: tuple, replicates: list, objectives=("carbon", "thaw")) -> 
     if table[responses].notna().any(axis=None):  # what does the same at every weight is one that does not respond
         table[responses] = table[responses].fillna(0.0)
     row = row_of(key, len(table)) | over_seeds(table.drop(columns="sd_over_episodes"))
-    row |= scores(replicates) | {"sd_over_episodes": table.sd_over_episodes.mean()}
-    policies = {run.primary for one in replicates for run in one.runs}
-    return row | {"primary": " and ".join(sorted(policies))}
+    return row | scores(replicates) | {"sd_over_episodes": table.sd_over_episodes.mean()}
 
 
 def paper_rows() -> pd.DataFrame:
@@ -171,7 +167,7 @@ def constant_plans(results, env_ids=ENVIRONMENTS) -> dict[tuple, list]:
             if plans is not None and (action is None or (plans.action == action).any()):
                 number = len(metrics.objectives_of(plans.columns))
                 evaluation = as_evaluation(plans, evaluation_weights(number), action)
-                rows[key] = [results.replicate([], dict.fromkeys(protocol.POLICIES, evaluation), PRIMARY, env_id)]
+                rows[key] = [results.replicate([], dict.fromkeys(protocol.POLICIES, evaluation), env_id)]
     return rows
 
 

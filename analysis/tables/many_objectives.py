@@ -25,7 +25,6 @@ def main_table(rows: dict, objectives) -> tuple[pd.DataFrame, dict]:
     """The metrics, a row a script and setting, and its columns."""
     table = pd.DataFrame([main_results.row_of_runs(key, replicates, objectives) for key, replicates in rows.items()])
     shared = (
-        "primary",
         "score_greedy",
         "score_sampled",
         "seeds_to_tell",

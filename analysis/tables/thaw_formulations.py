@@ -63,7 +63,7 @@ def under_asymmetric(results, one):
         table = table.assign(thaw_return=table[ASYMMETRIC]).drop(columns=ASYMMETRIC)
         scalarized = metrics.scalarize(metrics.returns_of(table), metrics.weights_of(table))
         by_policy[policy] = table.assign(scalarized_return=scalarized)
-    return results.replicate(one.runs, by_policy, one.runs[0].primary, arguments["env_id"])
+    return results.replicate(one.runs, by_policy, arguments["env_id"])
 
 
 def run_numbers(one) -> dict:

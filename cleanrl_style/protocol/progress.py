@@ -23,6 +23,12 @@ class Progress:
         self.start = time.perf_counter()
         self.shown = -np.inf
         self.returns = deque(maxlen=100)
+        self.done = done
+
+    def add(self, number: int = 1) -> None:
+        """So many more are done."""
+        self.done += number
+        self.show(self.done)
 
     def show(self, done: int, last: bool = False) -> None:
         """Show the line if it is time to, and always at the end; last: no more comes, though less than the total."""

@@ -29,7 +29,7 @@ def write_run(
 ):
     """A finished run whose mean returns per weight are the given ones."""
     rows = []
-    for policy, shift in (("greedy", 100.0), ("sampled", 0.0)):
+    for policy, shift in (("greedy", 0.0), ("sampled", 100.0)):
         for weight, c, t in zip(weights, carbon, thaw, strict=True):
             for episode, site in enumerate((-1.0, 1.0)):
                 rows.append(
