@@ -141,25 +141,18 @@ def test_ctrl_c_says_how_to_go_on(interrupted):
     assert (folder / "checkpoint.pt").exists() and not (folder / "evaluation.csv").exists()
 
 
-def test_before_the_first_checkpoint_the_same_command_starts_it_again(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    "flags, command", [((), "the same command"), (("--overwrite",), "the same command without --overwrite")]
+)
+def test_before_the_first_checkpoint_a_command_starts_it_again(tmp_path, monkeypatch, capsys, flags, command):
     def interrupt(run, *row):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(run_folder.Run, "log", interrupt)
-    with pytest.raises(SystemExit, match="130"):
-        run_script("cleanrl_style/eupg_var_lambda.py", "--run-dir", tmp_path, *arguments("eupg_var_lambda", TOY))
-    assert capsys.readouterr().err.strip() == f"{tmp_path}: interrupted; the same command starts it again"
-
-
-def test_after_overwrite_it_says_without_overwrite(tmp_path, monkeypatch, capsys):
-    def interrupt(run, *row):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(run_folder.Run, "log", interrupt)
-    given = ("--run-dir", tmp_path, "--overwrite", *arguments("eupg_var_lambda", TOY))
+    given = ("--run-dir", tmp_path, *flags, *arguments("eupg_var_lambda", TOY))
     with pytest.raises(SystemExit, match="130"):
         run_script("cleanrl_style/eupg_var_lambda.py", *given)
-    assert capsys.readouterr().err.endswith(": interrupted; the same command without --overwrite starts it again\n")
+    assert capsys.readouterr().err.strip() == f"{tmp_path}: interrupted; {command} starts it again"
 
 
 def copy(interrupted, tmp_path):
