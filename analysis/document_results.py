@@ -322,7 +322,8 @@ def other_libraries(results: Results) -> str:
     for (script, env_id, setting), replicates in rows:
         runs = [run for one in replicates for run in one.runs]
         cost = pd.concat([run.tables["cost"] for run in runs]).median()
-        hours = np.median([sum(runtime.hours(run)[name] for name in ("training", "evaluation")) for run in runs])
+        of_runs = [sum(runtime.hours(run)[name] for name in ("training", "evaluation")) for run in runs]
+        hours = pd.Series(of_runs).median()  # of those that have a time
         scores = main_results.scores(replicates)
         shown = [scores["score_greedy"], scores["score_sampled"], scores.get("gain_scalarized", np.nan)]
         shown += [hours, cost.peak_memory_mb / 1000]
