@@ -133,8 +133,7 @@ def main(args: Args) -> None:
     parts = {group: table.with_name(f"{table.stem}_{group.replace(' ', '_')}.csv") for group in groups}
     for group, of in groups.items():
         if stored.is_finished(parts[group], made_by):
-            for _ in range(len(WORLDS) * len(of)):
-                progress.add()
+            progress.add(len(WORLDS) * len(of))
         else:
             stored.write(parts[group], play_all(of, args, progress.add), made_by)
     whole = pd.concat([stored.read(part, text=("value",)) for part in parts.values()], ignore_index=True)
