@@ -197,16 +197,15 @@ def plans(results: Results, environment: str) -> list[tuple[str, list]]:
 
 def other_worlds(results: Results) -> str:
     """Score and gain of what was trained with more objectives or in another climate."""
-    text = "| environment | method | seeds | score, greedy | score, sampled | gain |\n" + "|---" * 6 + "|\n"
-    columns = {name: COLUMNS[name] for name in ("score_greedy", "score_sampled", "gain_scalarized")}
+    columns, rows = {name: COLUMNS[name] for name in ("score_greedy", "score_sampled", "gain_scalarized")}, []
     lacking = list(experiments.OTHER_WORLDS)
     for (script, env_id, setting), replicates in results.rows.items():
         if env_id in experiments.OTHER_WORLDS and replicates:
-            title = titled(script, flags(setting))
-            cells = cells_of(main_results.scores(replicates), columns)
-            text += f"| `{env_id}` | {title} | {len(replicates)} | " + " | ".join(cells) + " |\n"
+            cells = [f"`{env_id}`", titled(script, flags(setting)), str(len(replicates))]
+            rows.append([*cells, *cells_of(main_results.scores(replicates), columns)])
             lacking = [name for name in lacking if name != env_id]
     names = ", ".join(f"`{name}`" for name in lacking)
+    text = excerpts.markdown(["environment", "method", "seeds", "score, greedy", "score, sampled", "gain"], rows)
     return text + (f"\n{names}. {not_run('worlds')}" if lacking else "")
 
 
@@ -307,18 +306,16 @@ def sites_alone(results: Results) -> str:
     columns, table = single_sites.COLUMNS, single_sites.make(results)
     if not has_numbers(table, columns):
         return not_run("main", "site")
-    text = "| " + " | ".join(columns.values()) + " |\n" + "|---" * len(columns) + "|\n"
-    for _, (site, *gains) in table[list(columns)].iterrows():
-        text += "| " + " | ".join([site, *("" if np.isnan(gain) else f"{gain:.2f}" for gain in gains)]) + " |\n"
-    return text
+    rows = table[list(columns)].to_numpy()
+    cells = [[site, *("" if np.isnan(gain) else f"{gain:.2f}" for gain in gains)] for site, *gains in rows]
+    return excerpts.markdown(columns.values(), cells)
 
 
 def other_libraries(results: Results) -> str:
     """Score, gain, hours and memory of the algorithms of other libraries, a row an environment and setting."""
     columns = ("method", "environment", "seeds", "score, greedy", "score, sampled", "gain", "hours", "GB")
     columns += ("steps", "steps of its own evaluation")
-    text = "| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|\n"
-    rows = [(key, found) for key, found in results.rows.items() if key[0] in methods.OUTSIDE and found]
+    rows, lines = [(key, found) for key, found in results.rows.items() if key[0] in methods.OUTSIDE and found], []
     for (script, env_id, setting), replicates in rows:
         runs = [run for one in replicates for run in one.runs]
         cost = pd.concat([run.tables["cost"] for run in runs]).median()
@@ -330,7 +327,7 @@ def other_libraries(results: Results) -> str:
         cells = [titled(script, flags(setting)), f"`{env_id}`", str(len(replicates))]
         cells += ["" if np.isnan(x) else f"{x:.{digits}f}" for x, digits in zip(shown, (0, 0, 2, 1, 1), strict=True)]
         cells += [f"{cost.steps:,.0f}", f"{cost.own_evaluation_steps:,.0f}"]
-        text += "| " + " | ".join(cells) + " |\n"
+        lines.append(cells)
     there = {(script, env_id) for (script, env_id, _), _ in rows}
     lacking = [
         f"{methods.title(script)} on `{env_id}`"
@@ -338,8 +335,8 @@ def other_libraries(results: Results) -> str:
         for script in methods.OUTSIDE
         if (script, env_id) not in there
     ]
-    text += f"\nNot run yet: {', '.join(lacking)}.\n" if lacking else ""
-    return text if rows else not_run("outside")
+    text = f"\nNot run yet: {', '.join(lacking)}.\n" if lacking else ""
+    return excerpts.markdown(columns, lines) + text if rows else not_run("outside")
 
 
 #: Split -> what it is for; the shifts besides.

@@ -12,6 +12,7 @@ from scipy import stats
 from analysis import methods, paths, stored
 from analysis.studies import boreal_map as region_map
 from analysis.studies import replanning, site_choice, site_regression
+from analysis.tables.common import markdown
 from analysis.validation import robustness_report
 from cleanrl_style import protocol
 
@@ -53,11 +54,6 @@ def figures(names) -> pd.DataFrame:
     if missing:
         protocol.fail(f"{path}: no row {missing[0]!r}; python analysis/benchmark.py writes it")
     return table.loc[list(names)]
-
-
-def markdown(header, rows) -> str:
-    """A table, a line each."""
-    return "".join(f"| {' | '.join(line)} |\n" for line in (header, ["---"] * len(header), *rows))
 
 
 def without_empty_columns(text: str) -> str:

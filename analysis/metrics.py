@@ -20,7 +20,6 @@ from cleanrl_style.protocol.fronts import (  # noqa: F401
     expected_utility,
     hypervolume,
     is_nondominated,
-    nondominated,
     objectives_of,
     return_columns,
     returns_of,
@@ -32,7 +31,6 @@ from cleanrl_style.protocol.fronts import (  # noqa: F401
 from cleanrl_style.protocol.score import (  # noqa: F401
     best_constant_plans,
     by_weight,
-    gain_hypervolume,
     gains,
     mean_scalarized,
     score,

@@ -83,7 +83,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import runs
-from analysis.excerpts import markdown
+from analysis.tables.common import markdown
 from cleanrl_style import protocol
 from cleanrl_style.protocol import files, fronts, reference, score
 from cleanrl_style.protocol.arguments import ask

@@ -171,11 +171,11 @@ def year_curve(ax, replicates, variable: str, colour, label: str, style="-") -> 
     band(ax, np.arange(1, curves.shape[1] + 1), curves, colour, label, style)
 
 
-def by_season(replicates, bins: int = 8) -> tuple[np.ndarray, np.ndarray]:
+def by_season(replicates) -> tuple[np.ndarray, np.ndarray]:
     """Thaw return against growing season: means in bins with equally many episodes, (points), (replicates, points)."""
 
     def of_one(one):
-        groups = pd.qcut(one.evaluation.growing_season_days, bins, labels=False, duplicates="drop")
+        groups = pd.qcut(one.evaluation.growing_season_days, 8, labels=False, duplicates="drop")
         return one.evaluation.groupby(groups)[["growing_season_days", "thaw_return"]].mean()
 
     tables = [of_one(one) for one in replicates]
@@ -209,7 +209,7 @@ def mean_front(replicates) -> pd.DataFrame:
     return pd.concat(tables).groupby(level=0).mean()
 
 
-def weight_points(ax, replicates, marker="o"):
+def weight_points(ax, replicates):
     """Every seed's mean returns at each weight, small, and their mean, large, coloured by the weight."""
     for one in replicates if len(replicates) > 1 else ():
         front = metrics.mean_returns(one.evaluation)
@@ -235,7 +235,6 @@ def weight_points(ax, replicates, marker="o"):
         vmin=0,
         vmax=1,
         s=28,
-        marker=marker,
         edgecolors="black",
         linewidths=0.5,
     )

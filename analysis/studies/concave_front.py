@@ -50,7 +50,7 @@ def study(task: protocol.Task, seeds: list[int]) -> tuple[pd.DataFrame, dict[str
     plans, of_plans = zip(*table.groupby("plan"), strict=True)
     returns = np.stack([rows.sort_values("seed")[columns].to_numpy() for rows in of_plans])
     gains = returns.mean(axis=1) - returns[plans.index(reference.NOTHING)].mean(axis=0)
-    best = [not ((gains >= one).all(axis=1) & (gains > one).any(axis=1)).any() for one in gains]
+    best = fronts.is_nondominated(gains)
     order = [k for k in np.argsort(gains[:, 0]) if best[k]]
     front = pd.DataFrame(
         {"plan": [plans[k] for k in order], "carbon_gain": gains[order, 0], "thaw_gain": gains[order, 1]}

@@ -19,6 +19,7 @@ import boreal_env
 import sim
 from analysis import make_scenarios, metrics, paths, stored
 from analysis.studies import open_loop
+from analysis.tables.common import markdown
 from cleanrl_style import protocol
 from cleanrl_style.protocol import reference
 from sim.scenario import FIRST_YEAR, check_scenario
@@ -304,7 +305,7 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
     parts = ["# Warming", head, question, answer(table, ground), defined, ground_table(table, ground)]
     parts += ["![Fronts of constant plans, and the share of sites that stay frozen](images/warming.png)", drifted]
     parts += [compared, published_table(plans, years), explained, returns, returns_table(plans)]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
 def drift(plans: pd.DataFrame, years: pd.DataFrame, today: str, first: str, last: str) -> str:
@@ -321,12 +322,6 @@ def drift(plans: pd.DataFrame, years: pd.DataFrame, today: str, first: str, last
         f"{after:.2f} m in all. A count of sites has it in it, so the table has the years; changes below are against "
         f"the same years without a scenario. The figure's right half is of the {count} sites, each year by itself."
     )
-
-
-def markdown(names: tuple[str, ...], rows) -> str:
-    """A table."""
-    lines = (f"| {' | '.join(cells)} |" for cells in rows)
-    return "\n".join([f"| {' | '.join(names)} |", "|---" * len(names) + "|", *lines])
 
 
 def ground_table(table: pd.DataFrame, ground: pd.Series) -> str:

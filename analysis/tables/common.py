@@ -82,25 +82,16 @@ def remove_table(stem: Path) -> None:
         stem.with_suffix(suffix).unlink(missing_ok=True)
 
 
+def markdown(header, rows) -> str:
+    """A Markdown table, a line each."""
+    return "".join(f"| {' | '.join(line)} |\n" for line in (header, ["---"] * len(header), *rows))
+
+
 def write_table(stem: Path, table: pd.DataFrame, text: pd.DataFrame) -> None:
     """stem.csv with all numbers; stem.md and stem.tex (booktabs) with the readable columns."""
     with protocol.replacing(stem.with_suffix(".csv")) as file:
         table.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
-    lines = [text.columns, ["---"] * text.shape[1], *text.to_numpy()]
-    markdown = "".join("| " + " | ".join(line) + " |\n" for line in lines)
     with protocol.replacing(stem.with_suffix(".md")) as file:
-        file.write(markdown.encode())
-    head, *body = [
-        " & ".join(line).replace("_", r"\_").replace("%", r"\%") + r" \\" for line in (text.columns, *text.to_numpy())
-    ]
-    latex = [
-        rf"\begin{{tabular}}{{{'l' * text.shape[1]}}}",
-        r"\toprule",
-        head,
-        r"\midrule",
-        *body,
-        r"\bottomrule",
-        r"\end{tabular}",
-    ]
+        file.write(markdown(text.columns, text.to_numpy()).encode())
     with protocol.replacing(stem.with_suffix(".tex")) as file:
-        file.write(("\n".join(latex) + "\n").encode())
+        file.write(text.to_latex(index=False, escape=True, column_format="l" * text.shape[1]).encode())

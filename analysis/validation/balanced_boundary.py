@@ -12,7 +12,7 @@ YEARS = 10
 UNDISTURBED = {"fire": False, "insects": False}
 
 
-def run_held(sites: list[dict], seeds: list, weather: str = "paper", years: int = YEARS) -> tuple[np.ndarray, ...]:
+def run_held(sites: list[dict], seeds: list, weather: str = "paper") -> tuple[np.ndarray, ...]:
     """Temperature of the boundary in balance [K] and mean heat into it [MJ m-2 yr-1] in the first years, (sites,) each.
 
     sites : parameters by name; seeds : of each, which give its first stand and weather.
@@ -22,8 +22,8 @@ def run_held(sites: list[dict], seeds: list, weather: str = "paper", years: int 
     first = stands.state[:, HELD_COLUMNS].copy()
     column = sim.RECORD_NAMES.index
     heat = np.zeros(len(sites))
-    for _ in range(years):
+    for _ in range(YEARS):
         record = stands.step(np.full(len(sites), NO_CHANGE))
         stands.state[:, HELD_COLUMNS] = first
         heat += record[:, column("boundary_warming_mj_m2")] - record[:, column("boundary_cooling_mj_m2")]
-    return stands.parameters[:, PARAMETER_NAMES.index(BOUNDARY)], heat / years
+    return stands.parameters[:, PARAMETER_NAMES.index(BOUNDARY)], heat / YEARS

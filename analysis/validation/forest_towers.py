@@ -50,10 +50,10 @@ def mean_annual_temperature() -> pd.Series:
     return course.mean(axis=1).where(course.notna().all(axis=1))
 
 
-def near_climate(warmest_c: float = WARMEST_C) -> list[str]:
-    """Sites without a disturbance since UNDISTURBED_BEFORE whose mean annual temperature is at most `warmest_c`."""
+def near_climate() -> list[str]:
+    """Sites without a disturbance since UNDISTURBED_BEFORE whose mean annual temperature is at most WARMEST_C."""
     table = towers.read_table("ABCflux_boreal_forests_monthly.csv.gz").drop_duplicates("site").set_index("site")
     since = table["disturb_year"].astype("string").str.extract(r"(\d{4})")[0].astype(float)
     undisturbed = ~(since >= UNDISTURBED_BEFORE)
     temperature = mean_annual_temperature()
-    return [site for site in table.index[undisturbed] if temperature[site] <= warmest_c]
+    return [site for site in table.index[undisturbed] if temperature[site] <= WARMEST_C]

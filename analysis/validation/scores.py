@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 IN = "in"
 
@@ -64,8 +65,6 @@ def skill(modelled, measured) -> Skill:
 
 
 def poisson_interval(events: int) -> tuple[float, float]:
-    """95 % interval of the expected number of events, after Wilson and Hilferty (1931)'s chi-square."""
-    z = 1.959964
-    low = events * (1.0 - 1.0 / (9.0 * events) - z / (3.0 * math.sqrt(events))) ** 3 if events else 0.0
-    more = events + 1
-    return low, more * (1.0 - 1.0 / (9.0 * more) + z / (3.0 * math.sqrt(more))) ** 3
+    """Exact 95 % interval of the expected number of events (Garwood 1936)."""
+    low = stats.chi2.ppf(0.025, 2 * events) / 2.0 if events else 0.0
+    return float(low), float(stats.chi2.ppf(0.975, 2 * events + 2) / 2.0)
