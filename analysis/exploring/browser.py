@@ -27,7 +27,6 @@ FLAGS = (
     "--disable-component-update --disable-sync"
 ).split()
 PATIENCE_MS = 120_000  # for a first start, which compiles
-COLOURS = 255
 
 
 def program() -> str | None:
@@ -43,7 +42,7 @@ class Args:
     """file of the picture"""
     width: int = 1280
     """of the browser's window [pixels]"""
-    height: int = 1130
+    height: int = 1400
     """of the browser's window [pixels]"""
     years: int = 30
     """played before, in tens"""
@@ -89,7 +88,7 @@ def main(args: Args) -> None:
         tab.wait_for_timeout(2000)  # charts are drawn after texts
         shot = Image.open(io.BytesIO(tab.screenshot()))
     with protocol.replacing(args.path) as file:
-        shot.convert("RGB").quantize(COLOURS).save(file, format="png", optimize=True)
+        shot.convert("RGB").save(file, format="png", optimize=True)
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ SHOWN = (*LEARNERS, *STRATEGIES)
 CAPTION = (
     f"Returns are sums over 50 years. (a) {SEEDS_95}; {OF_SITES}. (b) 0: doing nothing, 100: the best constant plan of "
     "each weight; bars: interquartile mean over seeds, left greedy, right sampled; dots: seeds. (c) a point a weight, "
-    "plain mean over seeds. (d) large: mean over seeds, small: seeds."
+    "plain mean over seeds. (d) large: mean over seeds, small: seeds. (c, d) greedy."
 )
 
 

@@ -10,7 +10,8 @@ from analysis.reduction import BINS
 SIZE = (7, 7)
 MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
-    f"(a-e) evaluation, mean over the weights 0, 0.5 and 1; solid: conifers, dashed: deciduous; {SEEDS_95}. "
+    "(a-e, g) greedy policies in evaluation. (a-e) mean over the weights 0, 0.5 and 1; solid: conifers, dashed: "
+    f"deciduous; {SEEDS_95}. "
     "(f) last fifth of the training episodes of all seeds. (g) last year: median and 80 % of the episodes, "
     "medians over training seeds; small: each seed's median."
 )

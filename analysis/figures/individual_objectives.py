@@ -18,7 +18,10 @@ from cleanrl_style.protocol.fronts import evaluation_weights
 
 SIZE = (7, 5.2)
 MADE_BY = "python analysis/reproduce.py --only main"
-CAPTION = f"Returns are sums over 50 years; {SEEDS_95}. (a, b) {OF_SITES}. (c, d) means over the episodes."
+CAPTION = (
+    f"Returns are sums over 50 years; {SEEDS_95}. (a, b) {OF_SITES}. (c, d) greedy, means over the episodes; bands are "
+    "of these sites: on others a change by weight is less sure."
+)
 OBJECTIVES = {"carbon_return": "carbon return", "thaw_return": "thaw return"}
 
 

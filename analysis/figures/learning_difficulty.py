@@ -13,8 +13,8 @@ MADE_BY = "python analysis/studies/variance.py && python analysis/reproduce.py -
 CAPTION = (
     f"(b)-(d) one action in year {YEAR} under uniformly random valid actions, the same sites and weathers with "
     "either action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside; an interval to the left edge "
-    "reaches 0. (c) means alone; the table has their intervals. (d) half of the episodes have either action; dashed "
-    "line: those of a training run; an interval to "
+    "reaches 0. (c) means alone; carbon's step after 33 years is one year's, whose interval holds 0. (d) half of the "
+    "episodes have either action; dashed line: those of a training run; an interval to "
     "the right edge has no end; diamonds: of the effect as a generalised advantage (GAE) sees it, which may have "
     "the other sign. (b, d) Green: carbon, blue: thaw."
 )

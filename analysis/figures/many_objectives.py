@@ -17,8 +17,9 @@ from analysis.tables.many_objectives import file_stem
 COLOURS = ("#009e73", "#0072b2", "#d55e00", "#cc79a7", "#e69f00")  # of the objectives
 EQUAL, REFERENCE = "#999999", "black"
 CAPTION = (
-    "Evaluation: mean returns over episodes and training seeds (one seed: its own) at each weight. A line has the "
-    "colour of the largest weight's objective, grey where several share it."
+    "Evaluation, greedy: mean returns over episodes and training seeds (one seed: its own) at each weight. A line has "
+    "the colour of the largest weight's objective, grey where several share it; widths only keep lines "
+    "apart. In a triangle a corner is all weight on one objective, and the colour is the return."
 )
 
 STEM = "many_objectives"

@@ -22,7 +22,7 @@ MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
     "(a) mean over the seeds in eighths of the training, the mark is the last. "
     f"{OF_SITES}. (b) a point a weight, plain mean over seeds. (c) {SEEDS_95}. "
-    "(d) mean over the weights 0, 0.5 and 1 and seeds; bars: sd over seeds."
+    "(d) mean over the weights 0, 0.5 and 1 and seeds; lines on bars: sd over seeds. (b-d) greedy."
 )
 PARTS = 8  # of the training
 GROUP, BARS = 0.81, 0.75  # width of a class's bars, with the gaps between them and without

@@ -17,7 +17,7 @@ from analysis.figures.common import (
 SIZE = (7, 5.2)
 MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
-    f"Evaluation, means over the episodes and the weights 0, 0.5 and 1; {SEEDS_95}. (c) last year: median, and "
+    f"Evaluation, greedy: means over the episodes and the weights 0, 0.5 and 1; {SEEDS_95}. (c) last year: median, and "
     "80 % of the episodes, medians over training seeds, larger with the weight of carbon; small: each seed. "
     "(d) all weights; eighths of the episodes by days above 5 °C."
 )

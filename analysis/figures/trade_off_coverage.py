@@ -6,7 +6,7 @@ from analysis.methods import FIXED_WEIGHT, LEARNERS, METHODS, scripts
 SIZE = (7, 5.4)
 MADE_BY = "python analysis/reproduce.py --only main fixed"
 CAPTION = (
-    "Evaluation, means over the episodes, sums over 50 years. Large: mean over seeds; small: seeds; line: the "
+    "Evaluation, greedy: means over the episodes, sums over 50 years. Large: mean over seeds; small: seeds; line: the "
     "points that none dominates."
 )
 PANELS = dict.fromkeys(scripts(FIXED_WEIGHT), "fixed") | dict.fromkeys(LEARNERS, "main")  # script -> experiment

@@ -180,9 +180,9 @@ def title(table: pd.DataFrame, settings: dict) -> str:
     """The picture's title."""
     thaw, years = table.thaw_depth_change_m, settings["years"]
     return (
-        f"{settings['policy']}, carbon weight {settings['preference']:g}: thaw in the last {min(LAST, years)} of "
-        f"{years} years {thaw.mean():+.2f} m in the mean of {len(table):,} stands, {thaw.median():+.2f} m in the "
-        "middle one"
+        f"{settings['policy']} of {settings['env_id']}, carbon weight {settings['preference']:g}: "
+        f"thaw in the last {min(LAST, years)} of {years} years {thaw.mean():+.2f} m in the mean of {len(table):,} "
+        f"stands, {thaw.median():+.2f} m in the middle one"
     )
 
 
@@ -222,7 +222,9 @@ def draw(table: pd.DataFrame, spacing: float, title: str, path: Path) -> None:
             land.set_clip_path(outline)
         cells = cell_values(table, column, spacing)
         image = above.pcolormesh(*cells, cmap=colours, vmin=low, vmax=high, rasterized=True)
-        figure.colorbar(image, ax=above, orientation="horizontal", shrink=0.8, pad=0.02, label=label)
+        beyond = "both" if signed else "neither"  # 3 % of the stands
+        look = {"orientation": "horizontal", "shrink": 0.8, "pad": 0.02, "extend": beyond}
+        figure.colorbar(image, ax=above, label=label, **look)
         reach = 90.0 - LOWEST_LATITUDE
         above.set(aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
         above.axis("off")

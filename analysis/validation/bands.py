@@ -144,6 +144,7 @@ def draw(values: dict[str, dict[str, np.ndarray]]) -> bytes:
     axes = figure.subplots(4, 3).ravel()
     for ax, (name, samples) in zip(axes, values.items(), strict=True):
         check = CHECKS[name]
+        ax.use_sticky_edges = False  # a band's lower end is seen, too
         for row, kind in enumerate(ALL):
             if kind in check.bands:
                 band = check.bands[kind]
@@ -156,5 +157,5 @@ def draw(values: dict[str, dict[str, np.ndarray]]) -> bytes:
         ax.invert_yaxis()
         ax.set_title(name)
         ax.set_xlabel("" if check.unit == "1" else check.unit)
-    figure.suptitle("Held stands on sampled sites: median and 10-90 % of sites, and the observed band (grey)")
+    figure.suptitle("Held stands on sampled sites: median and 10-90 % of sites, and the band of observations (grey)")
     return document.png(figure)

@@ -305,7 +305,8 @@ def draw(episodes: dict[str, Run], even_aged: dict[str, Run], table: pd.DataFram
     handles, labels = axes[2, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)
     title = (
-        "Free-running stands: median and 10-90 % of sites; observed stands by age: plots (black), towers (light blue)"
+        "Free-running stands: median (rows 1-2: and 10-90 % of sites); observed stands by age: plots (black), towers "
+        "(light blue)\nBars: ranges of value and age; of mature stands without an age 70-130 or 50-90 years"
     )
     figure.suptitle(title)
     return document.png(figure)

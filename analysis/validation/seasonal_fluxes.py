@@ -113,7 +113,9 @@ def draw(runs: dict[str, dict[str, np.ndarray]], towers: dict[str, pd.DataFrame]
     month = np.arange(1, 13)
     for ax, (name, label) in zip(figure.subplots(2, 2).ravel(), FLUXES.items(), strict=True):
         conifers = towers[name].drop(index=forest_towers.ASPEN, errors="ignore")
-        ax.fill_between(month, conifers.min(), conifers.max(), color=GREY, alpha=0.3, lw=0, label="conifers, range")
+        ax.fill_between(
+            month, conifers.min(), conifers.max(), color=GREY, alpha=0.3, lw=0, label="towers of conifers, range"
+        )
         ax.plot(month, conifers.median(), color=BLACK, lw=1.5, label="towers of conifers, median")
         if forest_towers.ASPEN in towers[name].index:
             ax.plot(month, towers[name].loc[forest_towers.ASPEN], color=BLACK, lw=1.2, ls="--", label="tower of aspen")
