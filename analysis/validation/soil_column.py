@@ -6,7 +6,8 @@ beside others, and its boundary at other depths.
 Stands of several sites live under three policies. In every step each scheme below sees the organic layer that the
 simulator's soil sees, and conducts heat down to the boundary with the simulator's freezing curve, conductivities and
 capacities, after a spin-up of its own: what differs between schemes is discretisation. Steps and boundary depths are
-compared by running the simulator, on the same weather. Thaw returns here are sums of the reward before its clip.
+compared by running the simulator, on the same weather; snow's density has a step of a day in all of them. Thaw
+returns here are sums of the reward before its clip.
 """
 
 from concurrent.futures import ThreadPoolExecutor
