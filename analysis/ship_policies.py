@@ -29,7 +29,7 @@ class Args:
 
     runs: tyro.conf.Positional[tuple[Path, ...]]
     """folders of finished runs, or their policy.pt"""
-    folder: Path = Path("cleanrl_style", flags.SHIPPED.name)
+    folder: Path = flags.SHIPPED
     """folder of the policies that ship"""
 
 
@@ -45,7 +45,6 @@ def main(args: Args) -> None:
 
     if not args.runs:
         sys.exit("error: runs: at least one is needed")
-    paths.make_writable("--folder", args.folder)
     packed = {}
     for path in args.runs:
         try:
@@ -68,6 +67,7 @@ def main(args: Args) -> None:
         if name in packed:
             sys.exit(f"error: {path}: two policies of the name {name}")
         packed[name] = buffer.getvalue()
+    paths.make_writable("--folder", args.folder)
     for name, content in packed.items():
         with protocol.replacing(args.folder / f"{name}.pt") as file:
             file.write(content)

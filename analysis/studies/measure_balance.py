@@ -74,6 +74,8 @@ def main(args: Args) -> None:
         print(f"{name:20s} {change / paper:+13.3f} {carbon:+8.2f} {thaw:+8.2f}")
     chosen = unbeaten(sums)
     change, carbon, thaw = within_site_spread(sums, chosen)
+    if not (change > 0.0 and thaw > 0.0):
+        protocol.fail("--sites, --years: too few: on none do two policies differ that no other beats in both returns")
     scale = float(f"{change / thaw:.2g}")
     print(
         f"\nwithin-site standard deviations: of {len(sums)} policies the {chosen.sum(axis=0).mean():.1f} in the mean "
