@@ -15,7 +15,7 @@ class Args:
     seed: int = 1
     """seed of the run: training episodes"""
     env_id: str | None = None
-    """boreal-balanced-v0 or another that `python -m boreal_env` lists, or module:id of a BorealEnv (None: the mode's)"""
+    """boreal-balanced-v0 or another that `python -m boreal_env` lists, or a BorealEnv's module:id (None: the mode's)"""
     mode: Literal["generalist", "site-specific"] | None = None
     """a new site and weather in every episode of a group, or one fixed site (None: the environment's)"""
     site_seed: int | None = None
