@@ -146,7 +146,12 @@ class Described:
         return self._episodes.mask_function
 
     def lockstep(self, num_envs: int, **changes) -> "BorealVectorEnv":
-        """So many of these environments in lockstep: the same arguments, but for `changes`."""
+        """So many of these environments in lockstep: the same arguments, but for `changes`.
+
+        TypeError for a subclass of BorealEnv, whose own methods would be lost.
+        """
+        if isinstance(self, BorealEnv) and type(self) is not BorealEnv:
+            raise TypeError(f"{type(self).__name__}: lockstep is of BorealEnv itself, whose subclass it would ignore")
         return BorealVectorEnv(num_envs, **{**self._arguments, **changes})
 
 

@@ -224,6 +224,39 @@ def test_a_vector_environment_that_is_otherwise_than_ours_is_refused(envs, what)
         gym.registry.pop("otherwise-v0")
 
 
+class Halved(boreal_env.BorealEnv):
+    def step(self, action):
+        observation, reward, *rest = super().step(action)
+        return observation, reward / 2, *rest
+
+
+@pytest.mark.parametrize(
+    "envs, what",
+    [
+        (
+            {"entry_point": lambda: Doubled(boreal_env.BorealEnv(years=2))},
+            "hand its arguments on to BorealEnv: .*'record_years'",
+        ),
+        (
+            {"entry_point": Halved, "vector_entry_point": boreal_env.BorealVectorEnv, "kwargs": {"years": 2}},
+            r"its vector environment pays \[.*\] for what the single one pays \[",
+        ),
+    ],
+)
+def test_what_an_evaluation_would_play_otherwise_is_refused_before_a_training(envs, what):
+    gym.register("otherwise-v0", **envs)
+    try:
+        with pytest.raises(ValueError, match=what):
+            protocol.Task.of("otherwise-v0")
+    finally:
+        gym.registry.pop("otherwise-v0")
+
+
+def test_a_subclass_of_ours_has_no_lockstep_that_would_ignore_it():
+    with pytest.raises(TypeError, match="Halved: lockstep is of BorealEnv itself"):
+        Halved(years=2).lockstep(2)
+
+
 @pytest.mark.parametrize("reward, shown", [(1.0, "1.0"), (np.ones(3), r"\[1.0, 1.0, 1.0\]")])
 def test_a_reward_of_another_number_is_refused_before_a_file_is_written(reward, shown, tmp_path):
     class Paying(ToyEnv):

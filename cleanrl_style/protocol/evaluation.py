@@ -43,7 +43,7 @@ class PlainLoop(gym.vector.VectorEnv):
 
     def __init__(self, task: Task, num_envs: int):
         self.num_envs, self.num_objectives = num_envs, task.num_objectives
-        self.envs = [task.make(**kept_by(task)) for _ in range(num_envs)]
+        self.envs = [task.make(**task.recording) for _ in range(num_envs)]
 
     def reset(self, *, seed: list[int], options: dict):
         """seed: one per environment; options: preference, one per environment."""
@@ -129,12 +129,7 @@ def play(task: Task, envs, policy, weights: np.ndarray, seeds: list[int], greedy
 
 def make_envs(task: Task, num_envs: int) -> gym.vector.VectorEnv:
     """Environments in lockstep, else a plain loop; ours with the annual record."""
-    return task.make_lockstep(num_envs, **kept_by(task)) if task.has_lockstep else PlainLoop(task, num_envs)
-
-
-def kept_by(task: Task) -> dict:
-    """Arguments of an environment whose episodes keep the annual record, if it has one."""
-    return {"record_years": True} if task.boreal else {}
+    return task.make_lockstep(num_envs, **task.recording) if task.has_lockstep else PlainLoop(task, num_envs)
 
 
 def episodes_by_policy(task: Task, episodes: int, policies=POLICIES) -> dict[str, int]:

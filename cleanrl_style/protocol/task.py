@@ -90,12 +90,21 @@ class Task:
             entries = "observation 0" if len(weights) == 2 else f"observations 0 to {len(weights) - 2}"
             raise ValueError(f"reset(options={{'preference': w}}) must give w as {entries}")
         mask = as_mask(env.get_wrapper_attr("action_masks")())
-        _check_rewards("step", env.step(int(mask.argmax()))[1], weights.shape)
+        reward = env.step(int(mask.argmax()))[1]
+        _check_rewards("step", reward, weights.shape)
+        if self.boreal:  # an evaluation's environments, which a training would come to in hours
+            try:
+                self.make(**self.recording).close()
+            except TypeError as error:
+                raise ValueError(f"what makes it must hand its arguments on to BorealEnv: {error}") from error
         if self.has_lockstep:
-            self._check_lockstep(weights)
+            self._check_lockstep(weights, reward)
 
-    def _check_lockstep(self, weights: np.ndarray) -> None:
-        """Refuse a user's vector environment that restarts episodes, takes preferences or pays otherwise than ours."""
+    def _check_lockstep(self, weights: np.ndarray, reward: np.ndarray) -> None:
+        """Refuse a user's vector environment that restarts episodes, takes preferences or pays otherwise than ours.
+
+        reward (m,) : what the single environment of the same seed and preference paid for the first valid action.
+        """
         with contextlib.closing(self.make_lockstep(2)) as envs:
             if envs.metadata.get("autoreset_mode") is not gym.vector.AutoresetMode.SAME_STEP:
                 raise ValueError("its vector environment must restart episodes within the step: SAME_STEP autoreset")
@@ -104,12 +113,20 @@ class Task:
             if not np.array_equal(observations[:, : len(weights) - 1], both[:, :-1]):
                 raise ValueError("its vector environment must give each its own of reset(options={'preference': ws})")
             actions = self.action_masks(envs, observations).argmax(axis=1)
-            _check_rewards("its vector environment", envs.step(actions)[1], both.shape)
+            rewards = envs.step(actions)[1]
+            _check_rewards("its vector environment", rewards, both.shape)
+            if self.boreal and not np.allclose(rewards[0], reward):
+                raise ValueError(f"its vector environment pays {rewards[0]} for what the single one pays {reward}")
 
     @property
     def num_objectives(self) -> int:
         """m, the length of its reward."""
         return len(self.objectives)
+
+    @property
+    def recording(self) -> dict:
+        """Arguments of an environment whose episodes keep the annual record, if it has one."""
+        return {"record_years": True} if self.boreal else {}
 
     @cached_property
     def episode_columns(self) -> tuple[str, ...]:
