@@ -339,6 +339,26 @@ def other_libraries(results: Results) -> str:
     return excerpts.markdown(columns, lines) + text if rows else not_run("outside")
 
 
+def nearest_plans(results: Results) -> str:
+    """MORL/D's greedy policies and the constant plans whose returns are nearest to theirs, a row a training."""
+    columns = ["environment", "seed", "score, greedy", "score, sampled", "plan nearest at weight 0", "at 0.5", "at 1"]
+    lines = []
+    for (script, env_id, _), replicates in results.rows.items():
+        for one in replicates if script == "morld" else ():
+            nearest, apart = {}, []
+            plans = {name: metrics.returns_of(rows.sort_values("seed")) for name, rows in one.plans.groupby("plan")}
+            for weight, rows in metrics.by_weight(one.by_policy["greedy"]):
+                returns = metrics.returns_of(rows.sort_values("seed"))
+                distances = {name: np.sqrt(((of_plan - returns) ** 2).mean()) for name, of_plan in plans.items()}
+                nearest[weight] = min(distances, key=distances.get)
+                apart.append(distances[nearest[weight]])
+            scores = [f"{one.score_of(one.by_policy[policy]):.0f}" for policy in ("greedy", "sampled")]
+            names = [protocol.reference.title(nearest[weight]) for weight in (0.0, 0.5, 1.0)]
+            seed = str(one.runs[0].arguments["seed"])
+            lines.append([f"`{env_id}`", seed, *scores, *names, f"{max(apart):.3f}"])
+    return excerpts.markdown([*columns, "returns apart, at most"], lines) if lines else not_run("outside")
+
+
 #: Split -> what it is for; the shifts besides.
 SPLITS = {
     "validation": "variants and budgets are chosen on them; no training learns from them",
@@ -444,6 +464,7 @@ TABLES = {
     "short_table": main_points.short_table,
     "in_words": main_points.in_words,
     "outside": other_libraries,
+    "nearest_plans": nearest_plans,
     "splits": splits,
     "generalisation": on_other_sites,
     "difficulty": difficulty,
