@@ -322,10 +322,11 @@ def other_libraries(results: Results) -> str:
         of_runs = [sum(runtime.hours(run)[name] for name in ("training", "evaluation")) for run in runs]
         hours = pd.Series(of_runs).median()  # of those that have a time
         scores = main_results.scores(replicates)
-        shown = [scores["score_greedy"], scores["score_sampled"], scores.get("gain_scalarized", np.nan)]
-        shown += [hours, cost.peak_memory_mb / 1000]
         cells = [titled(script, flags(setting)), f"`{env_id}`", str(len(replicates))]
-        cells += ["" if np.isnan(x) else f"{x:.{digits}f}" for x, digits in zip(shown, (0, 0, 2, 1, 1), strict=True)]
+        cells += cells_of(
+            scores, {name: COLUMNS[name] for name in ("score_greedy", "score_sampled", "gain_scalarized")}
+        )
+        cells += ["" if np.isnan(x) else f"{x:.1f}" for x in (hours, cost.peak_memory_mb / 1000)]
         cells += [f"{cost.steps:,.0f}", f"{cost.own_evaluation_steps:,.0f}"]
         lines.append(cells)
     there = {(script, env_id) for (script, env_id, _), _ in rows}

@@ -202,12 +202,13 @@ def paragraph(results, env_id: str) -> str:
 
 
 def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plans: list) -> str:
-    """Which trained method scores highest, and which are told from it, from 100 and from planting half and half."""
+    """Which trained method scores highest, and which are told from it, from 100 and from plans that look at nothing."""
     best = max(rows, key=lambda method: scores[method]["score_greedy"])
     alike = [
         method for method in rows if method != best and len(rows[method]) > 1 and not is_above(rows[best], rows[method])
     ]
 
+    best_blind = [method for method in rows if is_above(rows[method], deciduous)]
     above = [method for method in rows if is_above(rows[method], planting)]
     below = [method for method in rows if is_below(rows[method], planting)]
     beside = {
@@ -229,7 +230,7 @@ def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plan
         f"By both intervals, that of seeds and sites and that of seeds alone by t, {named(over)} above 100"
         + (f", {named(even)} not told apart from 100" if even else "")
         + (f", {below_it}" if under else "")
-        + f"; {named(above)} above planting half and half; "
+        + f"; {named(best_blind)} above 100 deciduous trees a year, {named(above)} above +100 a year, half conifers; "
         f"{named(below)} below that."
     )
 
@@ -248,8 +249,8 @@ def of_longer_trainings(results, env_id: str, best_plans: list) -> str:
         text += f"{side}."
     if longer:
         more = listed([points(replicates, best_plans, best_plans) for replicates in longer.values()])
-        text += " These intervals are of sites like these, which have other best plans and so another 100. Over the "
-        text += f"best plans of these very sites it gains {more} points more."
+        text += " These intervals are of sites like these, which have other best plans and so another 100. Against the "
+        text += f"best plans of these 200 sites, taken as given, it gains {more} points more."
     return text
 
 

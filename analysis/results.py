@@ -11,6 +11,7 @@ from analysis import experiments, methods, metrics, paths, reduction, runs, stor
 from analysis.studies.constant_plans import of_environment
 from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
+from cleanrl_style.protocol import fronts
 from cleanrl_style.protocol.evaluation import PRIMARY
 from cleanrl_style.protocol.run_folder import as_text
 
@@ -129,9 +130,12 @@ class Results:
         }
 
     def _weights_of(self, key, row: dict) -> set[tuple]:
-        """Of agents of one weight each, the weights of the experiment, or if it has none those that any seed has."""
+        """Of agents of one weight each, the weights of the experiment, or if it has none those of an evaluation."""
         planned = {weights_of(job.flags) for job in self.jobs if job.row == key and "preference" in job.flags}
-        return planned or {weights_of(run.arguments) for its_runs in row.values() for run in its_runs} - {None}
+        if planned or all(weights_of(run.arguments) is None for its_runs in row.values() for run in its_runs):
+            return planned
+        every = fronts.evaluation_weights(len(self.objectives(key[1])))
+        return {tuple(np.ravel(weight).tolist()) for weight in every}
 
     def _planned(self, key, row: dict) -> dict:
         """A row without agents of weights that its experiment has not, which are named."""

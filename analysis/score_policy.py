@@ -86,6 +86,7 @@ from analysis import runs
 from analysis.tables.common import markdown
 from cleanrl_style import protocol
 from cleanrl_style.protocol import files, fronts, reference, score
+from cleanrl_style.protocol.agents import own_script
 from cleanrl_style.protocol.arguments import ask
 from cleanrl_style.protocol.summary import followed
 
@@ -129,6 +130,27 @@ def check(policy: protocol.Policy, folder: Path) -> str:
     if not np.allclose(first, second, atol=1e-4):
         raise ValueError(f"{folder}: its policy does not play what evaluation.csv says (of another physics?)")
     return f"plays its evaluation again, {len(again)} episodes"
+
+
+def check_script(args: Args) -> None:
+    """ValueError if a folder names a script of its own: what is handed in runs only once somebody has named it."""
+    named = own_script(args.policy) if args.script is None and args.policy.is_dir() else None
+    if named is not None:
+        raise ValueError(f"{args.policy}: its config.json names {named}; once you have read it, --script {named}")
+
+
+def check_repeats(policy: protocol.Policy, task: protocol.Task, evaluation: pd.DataFrame) -> None:
+    """Play the first episodes again, fewer at once; ValueError if a policy does something else then."""
+    weights = np.unique(fronts.weights_of(evaluation), axis=0)
+    again, _ = protocol.evaluate(task, policy.probabilities, weights, min(CHECKED, evaluation.seed.nunique()))
+    key = ["policy", *fronts.weight_columns(task.objectives), "seed"]
+    both = evaluation.merge(again, on=key, suffixes=("", "_again"))
+    columns = fronts.return_columns(task.objectives)
+    if not np.allclose(both[columns], both[[f"{name}_again" for name in columns]], atol=1e-4):
+        raise ValueError(
+            f"{policy.name}: it plays otherwise when it plays again; probabilities may depend on the stand's own "
+            "observation, mask and accrued returns alone"
+        )
 
 
 def task_of(policy: protocol.Policy, env_id: str) -> protocol.Task:
@@ -201,10 +223,18 @@ def main(args: Args) -> None:
         if not ask(env_id, "--tasks").boreal:
             fail(f"--tasks {env_id}: constant plans, and so a score, are of the boreal environments alone")
     try:
+        check_script(args)
         policy = protocol.load_policy(args.policy, args.script)
         check_name(args.name or policy.script, args)
         if args.add and policy.env_id not in TASKS:
             raise ValueError(f"--add: a policy trained on {' or '.join(TASKS)} is allowed, not on {policy.env_id}")
+        changed = [
+            name
+            for name, usual in (("site_seed", (None,)), ("thaw_formulation", (None, "asymmetric")))
+            if policy.arguments.get(name) not in usual
+        ]
+        if args.add and changed:
+            raise ValueError(f"--add: a policy trained on the task itself is allowed, not with another {changed[0]}")
         tasks = [task_of(policy, env_id) for env_id in args.tasks]  # refused before anything is played
         print(f"{policy.name}: {policy.script}, {check(policy, args.policy)}")
         row = {
@@ -215,6 +245,7 @@ def main(args: Args) -> None:
         }
         for env_id, task in zip(args.tasks, tasks, strict=True):
             one = comparison(policy, task, args.episodes)
+            check_repeats(policy, task, one.evaluation)
             row |= {f"{kind}, {env_id}": one.score(kind) for kind in protocol.POLICIES}
             scores = ", ".join(f"{one.score(kind):z.0f} {kind}" for kind in protocol.POLICIES)
             gain, best = one.by_weight["greedy"].mean(), one.by_weight["best"].mean()

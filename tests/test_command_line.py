@@ -257,6 +257,32 @@ def test_a_run_is_checked_and_scored(run, capsys):
     assert "plays its evaluation again" in out and "boreal-site-specific-v0: SCORE" in out
 
 
+def test_a_script_that_a_folder_brings_runs_only_when_it_is_named(run, tmp_path):
+    shutil.copytree(run, tmp_path / "run")
+    (tmp_path / "ppo_gated.py").write_text("raise RuntimeError('it ran')\n")
+    config = json.loads((run / "config.json").read_text())
+    (tmp_path / "run" / "config.json").write_text(json.dumps(config | {"file": str(tmp_path / "ppo_gated.py")}))
+    with pytest.raises(SystemExit, match=f"names {tmp_path}/ppo_gated.py; once you have read it, --script"):
+        score_policy.main(score_policy.Args(tmp_path / "run", tasks=("boreal-site-specific-v0",), episodes=1))
+
+
+def test_a_policy_with_dice_of_its_own_is_refused(run):
+    policy = protocol.load_policy(run)
+    dice = np.random.default_rng(0)
+
+    def drawn(observations, masks, accrued_returns):
+        return np.eye(25)[[dice.choice(np.flatnonzero(mask)) for mask in masks]]
+
+    task = policy.task()
+    for probabilities in (policy.probabilities, drawn):
+        evaluation, _ = protocol.evaluate(task, probabilities, (0.0, 1.0), 2)
+        if probabilities is drawn:
+            with pytest.raises(ValueError, match="plays otherwise when it plays again"):
+                score_policy.check_repeats(replace(policy, probabilities=drawn), task, evaluation)
+        else:
+            score_policy.check_repeats(policy, task, evaluation)
+
+
 def test_a_policy_of_another_observation_is_refused_before_it_plays(run, monkeypatch):
     monkeypatch.setattr(protocol, "evaluate", None)
     with pytest.raises(SystemExit, match="observes 43 entries; boreal-balanced-v0 has 105: --tasks"):

@@ -62,11 +62,11 @@ def test_short_table(results):
     assert lines[0] == "| method | training seeds | `boreal-balanced-v0` | `boreal-generalist-v0` |"
     assert lines[2:] == [
         "| +100 a year | | 70 [65, 75] |  |",
-        "| 100 deciduous trees a year | | 95 [90, 100] | 95 [90, 100] |",
+        "| 100 deciduous trees a year | | 95.0 [90.0, 100.0] | 95.0 [90.0, 100.0] |",
         "| Variable λ EUPG | 5 | 60 [55, 65] |  |",
         "| PPO Gated | 5 | 80 [75, 85] |  |",
         "| Curriculum PPO | not run yet |  |  |",
-        "| Group PPO | 5 | 110 [105, 115] |  |",
+        "| Group PPO | 5 | 110.0 [105.0, 115.0] |  |",
         "| Plan regression | not run yet |  |  |",
     ]
 
@@ -86,24 +86,25 @@ def test_more_steps_are_a_row_of_their_own(results):
     results.rows_of_two_objectives().update(runs)
     rows = main_points.short_table(results).splitlines()
     assert rows[-3].startswith("| Group PPO | 5")
-    assert rows[-2] == "| Group PPO, 1,000,000 steps | 5 | 110 [105, 115] | 110 [105, 115] |"
+    assert rows[-2] == "| Group PPO, 1,000,000 steps | 5 | 110.0 [105.0, 115.0] | 110.0 [105.0, 115.0] |"
     words = " ".join(main_points.in_words(results).split())
-    assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110 [105, 115], above 100. These" in words
-    assert "Over the best plans of these very sites it gains 10.0 points more." in words
+    assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110.0 [105.0, 115.0], above 100. These" in words
+    assert "Against the best plans of these 200 sites, taken as given, it gains 10.0 points more." in words
 
 
 def test_the_words_follow_from_the_numbers(results):
     plans, ahead, followed = (" ".join(point.split()) for point in main_points.in_words(results).split("\n  - ")[1:])
     assert plans == (
-        "Plans that look at nothing: 100 stems a year, half of them conifers, score 70, 100 deciduous trees a year 95 "
-        "[90, 100]. All constant plans together have a gain hypervolume of 3.00. The best of each weight, which 100 "
-        "stands for, gain 0.5 % less when they are chosen on a half of the sites and judged on the other."
+        "Plans that look at nothing: 100 stems a year, half of them conifers, score 70, 100 deciduous trees a year "
+        "95.0 [90.0, 100.0]. All constant plans together have a gain hypervolume of 3.00. The best of each weight, "
+        "which 100 stands for, gain 0.5 % less when they are chosen on a half of the sites and judged on the other."
     )
     assert ahead == (
-        "Of 5 trained methods Group PPO scores highest, 110 [105, 115] with 5 training seeds and a gain hypervolume "
-        "of 2.50. Its score less that of 100 deciduous trees a year is 15.0. By both intervals, that of seeds and "
-        "sites and that of seeds alone by t, Group PPO is above 100, 3 below 100; Group PPO is above planting "
-        "half and half; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
+        "Of 5 trained methods Group PPO scores highest, 110.0 [105.0, 115.0] with 5 training seeds and a gain "
+        "hypervolume of 2.50. Its score less that of 100 deciduous trees a year is 15.0. By both intervals, that of "
+        "seeds and sites and that of seeds alone by t, Group PPO is above 100, 3 below 100; none is above 100 deciduous "
+        "trees a year, Group PPO is above +100 a year, half conifers; Variable λ EUPG is below that. Few training "
+        "seeds: MOEA/D 1. Not run yet: Curriculum PPO."
     )
     assert followed == (
         "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. Asked for thaw instead of "
@@ -154,7 +155,9 @@ def test_a_method_is_above_or_below_another_by_all_of_its_interval_on_the_same_s
 def test_few_seeds_do_not_say_whether_the_preference_is_followed(results):
     rows = {key: found[:2] for key, found in results.rows_of_two_objectives().items() if key[0] != "ppo_gated"}
     words = " ".join(main_points.in_words(SimpleNamespace(rows_of_two_objectives=lambda: rows)).split())
-    assert "110 [105, 115] with 2 training seeds" in words and "Not run yet: PPO Gated and Curriculum PPO." in words
+    assert (
+        "110.0 [105.0, 115.0] with 2 training seeds" in words and "Not run yet: PPO Gated and Curriculum PPO." in words
+    )
     assert words.endswith("Whether a method follows the preference is said from 5 training seeds on.")
 
 
@@ -165,13 +168,14 @@ def test_without_runs_nothing_is_said(results):
 
 
 def test_intervals_are_left_out_where_there_are_none():
-    assert main_points.shown({"score_greedy": 99.6}) == "100"
+    assert main_points.shown({"score_greedy": 99.6}) == "99.6"
     assert main_points.shown({"score_greedy": float("nan")}) == ""
 
 
-def test_an_end_that_is_not_100_is_not_shown_as_100():
+def test_scores_near_100_have_a_decimal():
     assert score_text(101.2, 99.6, 101.9) == "101.2 [99.6, 101.9]"
-    assert score_text(100.0) == "100" and score_text(98.2, 96.0, 100.0) == "98 [96, 100]"
+    assert score_text(100.0) == "100.0" and score_text(98.2, 96.0, 100.0) == "98.2 [96.0, 100.0]"
+    assert score_text(94.4) == "94" and score_text(70.2, 60.0, 94.9) == "70 [60, 95]"
     assert main_points.named([], "store") == "none stores"
 
 

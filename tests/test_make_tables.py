@@ -262,15 +262,15 @@ def test_agents_of_one_weight_form_a_front(tmp_path, capsys):
 
 
 def test_seeds_of_other_weights_are_no_replicates(tmp_path, capsys):
-    """Where no experiment says which weights there are, it is those that any seed has."""
+    """Where no experiment says which weights there are, it is those of an evaluation: one weight is no front."""
     for seed, weight in ((1, 0.0), (2, 1.0)):
         write_agent_of_one_weight(tmp_path / "runs", seed, weight, env_id="boreal-balanced-v0")
     write_run(tmp_path / "runs" / "zero", "zero_change")
     table = make(tmp_path / "runs", tmp_path / "tables")
     assert "boreal-balanced-v0" not in table[table.seeds > 0].index.get_level_values("environment")
     said = capsys.readouterr().err
-    assert "seed 1: partial, without the agents of the weights 1" in said
-    assert "seed 2: partial, without the agents of the weights 0" in said
+    assert "seed 1: partial, without the agents of the weights 0.25, 0.5, 0.75, 1" in said
+    assert "seed 2: partial, without the agents of the weights 0, 0.25, 0.5, 0.75" in said
 
 
 def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):

@@ -50,8 +50,8 @@ def cell(row: pd.Series, name: str) -> str:
 
 
 def score_text(value: float, low: float = np.nan, high: float = np.nan) -> str:
-    """A score with its interval; of one decimal where an end that is not 100 would be printed as 100."""
-    digits = 1 if any(round(end) == 100 != end for end in (low, high) if not np.isnan(end)) else 0
+    """A score with its interval; near 100, which much is compared with, of one decimal."""
+    digits = 1 if any(95.0 <= one <= 105.0 for one in (value, low, high)) else 0
     if np.isnan(value):
         return ""
     one = np.isnan(low) or low == high

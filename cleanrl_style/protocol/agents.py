@@ -141,6 +141,7 @@ def load_policy(run_or_name, script=None) -> Policy:
         # a policy that ships is without its critic, which chooses nothing
         critic = {name: value for name, value in agent.state_dict().items() if name.startswith("critic.")}
         agent.load_state_dict({**critic, **saved["agent"]})
+        agent.eval()
     except (RuntimeError, TypeError, AttributeError, NameError) as error:
         trained_it = f"another version of {run['script']}.py than {module.__file__} trained it"
         raise ValueError(f"{path}: {trained_it}, of another network or with other arguments of Agent") from error

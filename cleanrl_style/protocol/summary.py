@@ -60,13 +60,13 @@ def print_score(objectives, comparison: Comparison) -> None:
     episodes = comparison.evaluation.seed.nunique()
     scores = {name: f"{comparison.score(name):z.0f}" for name in shown}
     policies = ", ".join(f"{scores[policy]} {policy}" for policy in sorted(POLICIES, key=lambda name: name != PRIMARY))
-    print(f"\nSCORE {policies}: 0 is to do nothing, 100 the best plan that does the same every year")
+    print(f"\nSCORE {policies}: 0 is to do nothing, 100 at each weight the best plan that does the same every year")
     what = comparison.utility.title
     print(f"\nGain: {what} of an episode above that of doing nothing, mean of {episodes} evaluation episodes")
     whose = objectives[0] if len(objectives) == 2 else ""
     if len(objectives) > 2:
         print(f"weights of {', '.join(objectives)}")
-    heads = (whose, "agent,", "agent,", "100 stems", "best"), ("weight", *POLICIES, "a year", "constant")
+    heads = (whose, "agent,", "agent,", "+100", "best"), ("weight", *POLICIES, "a year", "constant")
     for (first, *others), words in zip(heads, ("", "  plan, which is to"), strict=True):
         print(f"{first:>{label}}" + "".join(f"{head:>{WIDTH}}" for head in others) + words)
     for (key, values), plan, wanted in zip(table[shown].iterrows(), comparison.best_plans, chosen, strict=True):
@@ -100,13 +100,15 @@ def print_course(course: Course, table: pd.DataFrame) -> None:
 def followed(objectives, comparison: Comparison) -> str:
     """How far the primary policy follows the preference, and how far the best constant plans do."""
     first, last = comparison.weights[[0, -1], 0]
-    what = f"{objectives[0]} weight {first:g} to {last:g}" if len(objectives) == 2 else "own weight lowest to highest"
+    what = "Own weight lowest to highest (each should rise)"
+    if len(objectives) == 2:
+        what = f"Preference {first:g} to {last:g} ({objectives[0]} should rise, {objectives[1]} fall)"
     ours, best = (change(comparison.gains[name]) for name in (PRIMARY, "best"))
     changes = (
         f"{objective} {one:+z.2f} (best plans {other:+z.2f})"
         for objective, one, other in zip(objectives, ours, best, strict=True)
     )
-    return f"Following the preference, {what}: {', '.join(changes)}"
+    return f"{what}: {', '.join(changes)}"
 
 
 def draw_summary(
