@@ -258,7 +258,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `render_mode`: None or "rgb_array"
 
     ## Reset and Step
-    `reset(seed=, options={"preference": w, "site": {name: value}})`; seeds are at most 2^63 - 1, here and everywhere.
+    `reset(seed=, options={"preference": w, "site": {name: value}})`; what the site does not name is drawn, and
+    `sim.middle_site` names all. Seeds are at most 2^63 - 1, here and everywhere.
     `info` is empty but for the last step, where it has the episode's totals (and for `record_steps`). Bad values raise
     ValueError, a step before reset or after the end RuntimeError (of `gym.make`, before reset, ResetNeeded).
 

@@ -49,6 +49,7 @@ from analysis.exploring import style
 from analysis.exploring.charts import ALONE, ALONE_COLOUR, COLOURS, Lines, largest_stock, stems_by_age
 from analysis.exploring.players import trained_runs
 from analysis.exploring.site_controls import SiteControls
+from analysis.exploring.sliders import put
 from analysis.exploring.stand_card import StandCard
 from analysis.exploring.stands import YEARS, Stand
 
@@ -58,14 +59,17 @@ BREATH_MS = 200  # between years that are watched, in which the page hears its b
 INTRODUCTION = (
     "Manage a boreal forest for fifty years: store carbon in trees, and keep the frozen ground below them cold. Stands "
     "A and B begin alike, on the same site, under the same weather and the same dice of fire, insects and death; what "
-    "differs is who manages them. Gain is what their returns have above those of a third one, which is left alone."
+    "differs is who manages them. Gain is what their returns have above those of a third one, which is left alone. "
+    "The carbon return is of what stand and products have stored; the thaw return of heat that rose through a depth of "
+    "12 m, less 2.5 times what sank, so that more is colder. Cutting takes the oldest trees first."
 )
 
+THAW, NO_FROST_M = "Deepest thaw (m), where there is permafrost", sim.CONSTANTS["boundary_depth_m"].low
 #: Charts of the annual record over the years: title -> column.
 OF_RECORD = {
     "Stems (stems/ha)": "density_stems_ha",
     "Largest snowpack (mm of water)": "peak_swe_mm",
-    "Deepest thaw of the year (m)": "active_layer_depth_m",
+    THAW: "active_layer_depth_m",
 }
 SURFACE_M, DEEP_M = (sim.CONSTANTS[name].low for name in ("surface_soil_depth_m", "deep_soil_node_m"))
 #: Charts of the days of one year: title -> (column of the daily output, factor).
@@ -260,14 +264,17 @@ class Page:
         for title, lines in zip(OF_RETURNS, (carbon_returns, thaw_returns, gains), strict=True):
             self.returns[title].show(lines, year)
         for title, column in OF_RECORD.items():
-            self.record[title].show({name: view.history[column] for name, view in whole.items()}, year)
+            values = {name: np.array(view.history[column]) for name, view in whole.items()}
+            if title == THAW:
+                values = {name: np.where(depths < NO_FROST_M, depths, np.nan) for name, depths in values.items()}
+            self.record[title].show(values, year)
         days = {name: stand.days() for name, stand in self.stands.items()}
         for title, (column, factor) in OF_DAYS.items():
             self.days[title].show({name: factor * table[column].to_numpy() for name, table in days.items()})
         self.days_title.object = style.heading(
             f"Through year {year}, day by day" if year else "Day by day, from year 1 on"
         )
-        self.year.value = year
+        put(self.year, year)
 
     def layout(self) -> pn.Column:
         """Site on the left, stands and charts on the right; on a narrow screen the site comes last."""

@@ -199,6 +199,13 @@ def test_another_site_is_played_as_far(page):
     assert all(stand.setting.seed == 9 for stand in page.stands.values())
 
 
+def test_without_a_seed_no_stand_draws_its_own(page):
+    page.site.seed.value = None
+    assert "type a seed, 0 to" in page.message.object and page.buttons["A year"].disabled
+    page.site.seed.value = 3
+    assert not page.message.visible and all(stand.setting.seed == 3 for stand in page.stands.values())
+
+
 def test_my_own_hand_goes_on_from_what_was_done(page):
     card = page.cards["B"]
     page.forward(2)
@@ -282,8 +289,12 @@ def test_the_page_in_a_browser(tmp_path):
         tab.get_by_role("button", name="Play").click()
         tab.get_by_text(re.compile("After 1[23] of 50 years")).first.wait_for()
         tab.get_by_role("button", name="Pause").click()
-        tab.get_by_role("button", name="To the end").click()
-        tab.get_by_text("After 50 of 50 years").first.wait_for()
+        year = tab.locator("[role=slider][aria-valuemax='50.0']")
+        for _ in range(2):  # a drag that ends where the last one did is heard, too
+            tab.get_by_role("button", name="To the end").click()
+            tab.get_by_text("After 50 of 50 years").first.wait_for()
+            year.press("Home")
+            tab.get_by_text("After 0 of 50 years").first.wait_for()
 
         tab.set_viewport_size({"width": 390, "height": 800})
         tab.wait_for_timeout(500)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import panel as pn
 
+from analysis.exploring.sliders import put
 from analysis.exploring.stands import (
     PAPER,
     PLACES,
@@ -80,7 +81,9 @@ class SiteControls:
         widget.param.watch(chosen, what)
 
     def setting(self) -> Setting:
-        """What is chosen."""
+        """What is chosen. Raises ValueError without a seed, of which every stand would draw its own."""
+        if self.seed.value is None:
+            raise ValueError(f"type a seed, {self.seed.start} to {self.seed.end}")
         return Setting(self.world.value, self.site, self.seed.value)
 
     def layout(self) -> pn.Column:
@@ -108,5 +111,5 @@ class SiteControls:
         self.filling = True
         self.seed.value = seed
         for parameter, slider in self.sliders.items():
-            slider.value = round(self.site[parameter] - SCALES[parameter].zero, 2)
+            put(slider, round(self.site[parameter] - SCALES[parameter].zero, 2))
         self.filling = False

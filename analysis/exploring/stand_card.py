@@ -79,7 +79,7 @@ class StandCard:
         """Only those that matter to who manages the stand."""
         chosen = self.policy.value
         self.change.visible = self.mix.visible = chosen in (CONSTANT, BY_HAND)
-        self.change.label = "This year" if self.by_hand else "Each year, where it can be done"
+        self.change.label = "This year" if self.by_hand else "Each year, if possible"
         self.folder.visible = chosen == OTHER_RUN
         self.greedy.visible = chosen in (*self.runs, OTHER_RUN)
         self.hint.visible = self.by_hand and self.stand is not None and not self.stand.masks[self.action]

@@ -375,7 +375,8 @@ def draw_ground(ax, view: View) -> None:
     if organic > 0.0:
         labels.append((f"organic layer {100 * organic:.0f} cm", "right", 0.25 * organic))
     if view.year:
-        labels.append((f"thaws in summer, to {active:.2f} m", "left", max(0.5 * (organic + active), 0.3)))
+        thaws = f"thaws in summer, to {active:.2f} m" if active < depths[-1] - 0.01 else "no permafrost"
+        labels.append((thaws, "left", max(0.5 * (organic + active), 0.3)))
     frozen = np.interp(0.5 * (active + depths[-1]), depths, temperatures) < 0.0
     always = "all year" if view.year else "now"
     labels.append((f"{'frozen' if frozen else 'thawed'} {always}", "left", 0.5 * (active + depths[-1])))
