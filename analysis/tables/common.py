@@ -55,7 +55,7 @@ def score_text(value: float, low: float = np.nan, high: float = np.nan) -> str:
     if np.isnan(value):
         return ""
     one = np.isnan(low) or low == high
-    return f"{value:.{digits}f}" + ("" if one else f" [{low:.{digits}f}, {high:.{digits}f}]")
+    return f"{value:z.{digits}f}" + ("" if one else f" [{low:z.{digits}f}, {high:z.{digits}f}]")  # z: no -0
 
 
 def readable(table: pd.DataFrame, columns: dict[str, str]) -> pd.DataFrame:
