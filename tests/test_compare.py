@@ -1,5 +1,9 @@
 """Two methods are compared by their difference on the same sites."""
 
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
 import pytest
 from scripts import ROOT
 
@@ -19,8 +23,10 @@ def test_a_method_is_not_told_from_itself(capsys):
 
 def test_what_has_other_signs_in_no_interval_is_told_apart(capsys):
     compare.main(compare.Args(RUNS / "ppo_gated" / BALANCED, RUNS / "plan_regression" / BALANCED))
-    greedy = capsys.readouterr().out.splitlines()[2]
+    first, second, greedy, _ = capsys.readouterr().out.splitlines()
     assert greedy.startswith("greedy: first less second -") and ": told apart" in greedy
+    ours, theirs = (float(line.split(", score ")[1].split()[0]) for line in (first, second))
+    assert float(greedy.split()[4]) == pytest.approx(ours - theirs, abs=1.1)
 
 
 def test_a_single_training_has_no_interval(capsys):
@@ -45,3 +51,24 @@ def test_a_single_training_has_no_interval(capsys):
 def test_what_cannot_be_compared_is_named(first, second, wrong):
     with pytest.raises(SystemExit, match=wrong):
         compare.main(compare.Args(RUNS / first, RUNS / second))
+
+
+def test_both_intervals_have_to_tell(monkeypatch, capsys):
+    monkeypatch.setattr(compare.metrics, "welch_interval", lambda *_: (-1.0, 1.0))
+    compare.main(compare.Args(RUNS / "ppo_gated" / BALANCED, RUNS / "plan_regression" / BALANCED))
+    assert ": not told apart" in capsys.readouterr().out.splitlines()[2]
+
+
+def test_what_so_many_seeds_tell():
+    assert compare.told_from(np.array([-1.0, 1.0]) / 2**0.5, 17) == pytest.approx(1.0)
+
+
+def test_other_weights_are_refused(monkeypatch):
+    def row(*weights):
+        evaluation = pd.DataFrame({"preference": weights, "carbon_return": 0.0, "thaw_return": 0.0})
+        return ("script", "env", "default"), [SimpleNamespace(evaluation=evaluation, plans=None)]
+
+    rows = iter([row(0.0, 1.0), row(0.0, 0.5)])
+    monkeypatch.setattr(compare, "row_of", lambda folder: next(rows))
+    with pytest.raises(SystemExit, match="same environment and weights"):
+        compare.main(compare.Args(RUNS, RUNS))

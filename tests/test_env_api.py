@@ -52,7 +52,7 @@ def test_an_episode_is_fifty_years_by_default():
 def test_the_balanced_id_is_in_balance_and_the_papers_are_the_papers():
     paper, balanced = (gym.make(name).unwrapped._episodes for name in ("boreal-generalist-v0", "boreal-balanced-v0"))
     assert paper.reward == Reward()
-    assert balanced.reward == Reward(carbon_scale=boreal_env.BALANCED_CARBON_SCALE) != paper.reward
+    assert balanced.reward == Reward(carbon_scale=1.8) != paper.reward
     for episodes, world in ((paper, ("sampled", "drawn", 0.0)), (balanced, ("balanced", "balanced", 1.0))):
         stands = episodes.stands
         assert (stands.boundary, stands.soil_carbon, stands.weather["weather_as_observed"]) == world

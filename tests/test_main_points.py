@@ -191,3 +191,14 @@ def test_plans_that_were_chosen_on_their_sites_are_flattered():
     assert 2.0 < main_points.flattery(results, WORLD) < 20.0
     plans.loc[plans.action == 20, ["carbon_return", "thaw_return"]] = 5.0  # better on every site
     assert main_points.flattery(results, WORLD) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_below_is_all_of_the_interval_and_t_counts_too():
+    assert not main_points.is_below(replicates(-0.1, 0.5, 0.8), replicates(0.0))
+    assert not main_points.is_above(replicates(0.05, 0.2, 0.35), replicates(0.0))
+
+
+def test_the_front_of_plans_is_of_gains():
+    plans = pd.DataFrame({"action": [12, 24], "seed": 1, "carbon_return": [5.0, 6.0], "thaw_return": [5.0, 7.0]})
+    results = SimpleNamespace(constant_plans_in=lambda *_: plans)
+    assert main_points.front_of_plans(results, WORLD) == pytest.approx(2)

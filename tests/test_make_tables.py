@@ -11,7 +11,7 @@ import pytest
 from tiny_runs import TINY_RUNS, write_run, write_run_of_three
 
 import boreal_env
-from analysis import archive, experiments, make_figures, make_tables, paths, stored
+from analysis import archive, experiments, make_figures, make_tables, paths, runs, stored
 from analysis.results import Results
 from analysis.studies.signal_to_noise import CONTRASTS
 from analysis.tables import (
@@ -733,3 +733,10 @@ def test_a_study_of_another_simulator_is_named_once(tmp_path, capsys):
     assert capsys.readouterr().err.splitlines() == [
         f"{tmp_path / 'other.csv'}: made with another source of the simulator; its command makes it anew"
     ]
+
+
+def test_a_seed_that_comes_twice_at_a_weight_is_refused():
+    table = pd.DataFrame({"preference": [0.0, 0.0, 1.0, 1.0], "seed": [1, 2, 1, 1], "carbon_return": 0.0})
+    arguments = {"eval_weights": [0, 1], "eval_episodes": 2, "mode": "generalist"}
+    with pytest.raises(ValueError, match="lacks episodes"):
+        runs.check_policy(table.assign(thaw_return=0.0), "greedy", arguments, ["carbon", "thaw"])

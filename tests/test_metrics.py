@@ -7,6 +7,7 @@ import scipy.stats
 
 from analysis import metrics
 from analysis.tables.common import PAPER_TABLES
+from cleanrl_style.protocol import fronts
 
 FRONT = np.array([(0, 3), (1, 2), (3, 0)])
 
@@ -296,3 +297,17 @@ def test_gains_of_sites_and_plans():
     )
     cube = metrics.plans_of_sites(plans, np.array([(0, 1), (1, 0)]))
     assert cube.tolist() == [[[0, 0], [2, 1]], [[0, 0], [3, 4]]]
+
+
+def test_numbers_of_evaluation_weights():
+    assert [len(fronts.evaluation_weights(number)) for number in (2, 3, 4)] == [5, 15, 20]
+    of_lattice = fronts.simplex_lattice(3, 4).max(axis=1).mean()
+    assert fronts.expected_utility(np.eye(3), 15) == pytest.approx(of_lattice)
+
+
+def test_interquartile_means_cut_a_quarter_at_either_end():
+    assert metrics.iqm([0, 0, 1, 1, 1, 1, 100, 100]) == 1
+    gained = np.array([[1.0] * 20] * 15 + [[-100.0] * 20])
+    assert metrics.score_interval(gained, None) == pytest.approx((1, 1, 1))
+    one_fails = np.array([[1.0] * 20] * 7 + [[-100.0] * 20])
+    assert metrics.difference_interval(one_fails, np.zeros((8, 20)))[0] == pytest.approx(1)

@@ -178,3 +178,15 @@ def test_the_rounds_are_said(tmp_path, capsys):
     )
     phases = pd.read_csv(tmp_path / "some" / "timing.csv").set_index("phase").seconds
     assert 0 < phases["environment"].sum() < phases["rollout"].sum() and phases["update"].sum() > 0
+
+
+def test_a_penalty_of_as_many_sites_halves_the_slopes():
+    sites = np.array([-1.0, 1.0] * 10)
+    returns = np.stack([sites, -sites], axis=1)[..., None]
+    agent = fitted(sites[:, None], returns, ridge=20.0, plans=(12, 20), inputs=(1,))
+    np.testing.assert_allclose(agent.slopes[1, :, 0], [0.5, -0.5])
+
+
+def test_a_weight_of_small_returns_counts_as_much_as_one_of_large():
+    returns = torch.tensor([[[100.0, 0.0], [99.0, 0.0], [0.0, 1.0], [0.0, 0.5]]], dtype=torch.double)
+    assert closest_to_the_best(returns, torch.eye(2, dtype=torch.double), 3).tolist() == [0, 1, 2]

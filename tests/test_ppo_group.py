@@ -210,3 +210,16 @@ def test_an_environment_of_one_preference_is_refused(tmp_path, name):
     finally:
         del gym.registry["one-preference-v0"]
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("ratio, advantage, loss", [(2, 1, -1.2), (2, -1, 2.0), (0.5, 1, -0.5), (0.5, -1, 0.8)])
+def test_the_clipped_loss_by_hand(ratio, advantage, loss):
+    agent, x, mask = agent_of_three_entries(), torch.randn(1, 3), torch.ones(1, 25, dtype=torch.bool)
+    action = torch.zeros(1, dtype=torch.long)
+    old = agent.get_logprobs(x, mask)[:, 0].detach() - np.log(ratio)
+    target = agent.get_value(x).detach() + 2
+    args = SimpleNamespace(clip_coef=0.2)
+    policy_loss, value_loss, *_ = ppo_losses(
+        agent, x, mask, action, old, torch.tensor([float(advantage)]), target, args
+    )
+    assert policy_loss.item() == pytest.approx(loss, rel=1e-5) and value_loss.item() == pytest.approx(2.0, rel=1e-5)

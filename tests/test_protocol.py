@@ -432,3 +432,41 @@ def test_an_interrupt_that_a_library_swallowed_comes_again():
         protocol.Run._stop(run, signal.SIGTERM, None)
     with pytest.raises(KeyboardInterrupt):
         protocol.Run.time(run, "update", 0, 0.0)
+
+
+def test_each_episode_has_its_own_dice(monkeypatch):
+    seen, choose = [], evaluation.choose_actions
+
+    def spy(probabilities, uniforms):
+        if uniforms is not None:
+            seen.append(uniforms)
+        return choose(probabilities, uniforms)
+
+    monkeypatch.setattr(evaluation, "choose_actions", spy)
+    evaluate(uniform, eval_weights=(1.0,), eval_episodes=2)
+    assert len(set(seen[0])) == 2
+
+
+def test_probabilities_that_are_nearly_one_in_sum_are_refused():
+    with pytest.raises(ValueError, match="sums of 1"):
+        evaluation.check_probabilities(np.full((1, 25), 1.05 / 25), (1, 25))
+
+
+class OfUnequalLength:
+    """Two stands, whose episodes end after one year and after three; each year pays 1 of both."""
+
+    year = 0
+
+    def reset(self, seed, options):
+        return np.zeros((2, 3)), {}
+
+    def step(self, actions):
+        self.year += 1
+        return np.zeros((2, 3)), np.ones((2, 2)), np.array([True, self.year == 3]), np.zeros(2, bool), {}
+
+
+def test_what_comes_after_an_episode_s_end_is_not_counted():
+    task = SimpleNamespace(num_objectives=2, action_masks=lambda envs, observations: np.ones((2, 25), bool))
+    weights, greedy = np.full((2, 2), 0.5), np.ones(2, bool)
+    returns, _ = evaluation.play(task, OfUnequalLength(), lambda *_: np.eye(25)[[12, 12]], weights, [1, 2], greedy)
+    assert returns.tolist() == [[1, 1], [3, 3]]

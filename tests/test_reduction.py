@@ -100,3 +100,16 @@ def test_steps_that_a_killed_run_made_twice_are_timed_once():
         reduction.timing(pd.DataFrame(rows, columns=["phase", "global_step", "seconds"])).set_index("phase").seconds
     )
     assert seconds.to_dict() == {"rollout": 9.0, "update": 2.0}
+
+
+def test_an_episode_at_the_end_of_a_part_is_that_part_s():
+    assert reduction.learning(episodes(40, 1, 10), 400).episodes.tolist() == [1] * 40
+
+
+def test_the_composition_is_of_the_last_fifth():
+    assert reduction.composition(episodes(10, 1)).episodes.sum() == 2
+
+
+def test_the_last_year_is_the_last():
+    years = record([{"preference": 1.0}])
+    assert reduction.last_year(years.assign(p50=years.year)).p50.tolist() == [2]

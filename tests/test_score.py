@@ -241,3 +241,21 @@ def test_a_site_that_is_always_the_same_is_measured_once(task):
     one = protocol.Task.of("boreal-site-specific-v0")
     table = reference.reference_returns(one, [0, 1, 2])
     assert task.measured == [[0]] and set(table.seed) == {0, 1, 2}
+
+
+def test_the_best_plan_is_that_of_the_mean():
+    plans = [episodes(0, 0, plan="12"), episodes(np.array([0, 0, 12]), 0, plan="20"), episodes(1, 0, plan="22")]
+    plans = pd.concat(plans).assign(carbon_return=lambda table: table.carbon_return - np.tile(SITES, 3))
+    assert set(score.best_constant_plans(plans, np.array([[1.0, 0.0]])).plan) == {"20"}
+
+
+def test_the_hypervolume_of_gains_is_above_doing_nothing():
+    gained = pd.DataFrame({"preference": [0.0, 1.0], "carbon_return": [1.0, 2.0], "thaw_return": [3.0, 2.0]})
+    assert score.gain_hypervolume(gained) == pytest.approx(5)
+
+
+def test_as_many_other_weights_are_refused():
+    gained = compare(greedy=((0, 0, 4), (4, 4, 0))).gains
+    others = gained["greedy"].assign(preference=gained["greedy"].preference.replace(0.5, 0.25))
+    with pytest.raises(ValueError, match="same weights"):
+        score.score(others, gained["best"])

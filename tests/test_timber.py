@@ -15,7 +15,7 @@ import sim
 from sim.assortment import standing_wood, thicker_share
 from sim.demography import AGES
 from sim.jit import uncompiled
-from sim.task.timber import ITEMS, TIMBER_SCALE, Timber, read_prices, shipped_rows
+from sim.task.timber import DISCOUNT_RATE, ITEMS, TIMBER_SCALE, Timber, read_prices, shipped_rows
 
 PRICES = {
     "sawlog_conifer": 70.0,
@@ -243,3 +243,7 @@ def test_a_planted_seedling_costs_its_price():
     record = {name: np.zeros(1) for name in sim.RECORD_NAMES} | {"planted_stems_ha": np.array([100.0])}
     columns = Timber(PRICES, 0.0).columns(record, np.array([7]))
     assert columns["net_revenue_eur_ha"] == columns["discounted_revenue_eur_ha"] == -50.0
+
+
+def test_the_scale_of_timber_and_its_discount_are_those_that_results_have():
+    assert (TIMBER_SCALE, DISCOUNT_RATE) == (3000.0, 0.03)
