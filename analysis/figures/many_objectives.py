@@ -19,7 +19,7 @@ EQUAL, REFERENCE = "#999999", "black"
 CAPTION = (
     "Evaluation, greedy: mean returns over episodes and training seeds (one seed: its own) at each weight. A line has "
     "the colour of the largest weight's objective, grey where several share it; widths only keep lines "
-    "apart. In a triangle a corner is all weight on one objective, and the colour is the return."
+    "apart. Triangles, of three objectives: a corner is all weight on one, the colour is the return."
 )
 
 STEM = "many_objectives"

@@ -11,8 +11,7 @@ SIZE = (7, 3)
 MADE_BY = "python analysis/reproduce.py --only main"
 CAPTION = (
     "(a) evaluation, greedy: a point a site, mean over methods, weights and seeds; line: lowest to highest method; sd: "
-    "standard deviation; dotted: the least that fifty years can return, -1 each, which sites "
-    "near it hardly pass. "
+    "standard deviation; dotted: the least that fifty years can return, -1 each. "
     f"(b) {SEEDS_95}; {OF_SITES}."
 )
 LEAST = -50.0  # fifty years of a reward that is cut off at -1
