@@ -199,8 +199,9 @@ def weigh_advantages(advantages, weights):
     A factor that hangs on the preference alone leaves each preference's best policy as it is. Without it those whose
     objectives vary most would be all that is learnt.
     """
-    variance = ((weights @ advantages.T.cov()) * weights).sum(dim=1)
-    return protocol.scalarize(advantages, weights) / (variance.clamp(min=0).sqrt() + 1e-8)
+    variance = ((weights @ advantages.T.cov()) * weights).sum(dim=1).clamp(min=0).numpy()
+    # numpy's root: the last bit of torch's hangs on the processor
+    return protocol.scalarize(advantages, weights) / (torch.from_numpy(np.sqrt(variance)) + 1e-8)
 
 
 def spread_preferences(num_groups, group_size, num_objectives):

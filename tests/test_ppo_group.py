@@ -55,6 +55,15 @@ def test_advantages_are_divided_by_a_deviation_of_the_preference_alone():
     np.testing.assert_allclose(weighed, plain / plain.std(ddof=1), rtol=1e-6)
 
 
+def test_advantages_are_divided_by_roots_that_every_processor_makes_alike():
+    generator = torch.Generator().manual_seed(1)
+    advantages, weight = torch.randn((1000, 2), generator=generator), torch.rand(1000, generator=generator)
+    weights = torch.stack([weight, 1 - weight], dim=1)
+    variance = ((weights @ advantages.T.cov()) * weights).sum(dim=1)
+    exact = torch.from_numpy(np.sqrt(variance.numpy().astype(np.float64)).astype(np.float32))
+    assert torch.equal(weigh_advantages(advantages, weights), (weights * advantages).sum(dim=1) / (exact + 1e-8))
+
+
 def test_preferences_of_a_group_are_spread():
     np.random.seed(0)  # noqa: NPY002 (that generator is the scripts')
     weights = np.sort(spread_preferences(100, 8, 2).reshape(100, 8))
