@@ -2,7 +2,8 @@
 
 Imported before torch first calculates, it has torch do so in one way on all processors with AVX2. Left alone, its
 matrix products (MKL) and its functions of vectors take another order of sums on AMD's processors than on Intel's, and
-another with AVX-512, so that equal trainings part in a last bit. What is set in the environment stays as it is.
+another with AVX-512, so that equal trainings part in a last bit. Its roots stay the processor's own (decision 110).
+What is set in the environment stays as it is.
 """
 
 import os
