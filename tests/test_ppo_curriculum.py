@@ -14,7 +14,7 @@ from scripts import ROOT, run_script
 from toy_env import optimal_return
 
 import boreal_env
-from cleanrl_style import ppo_curriculum, ppo_group, protocol
+from cleanrl_style import ppo_curriculum, ppo_gated, ppo_group, protocol
 from cleanrl_style.ppo_curriculum import Agent, Args, Curriculum, compute_gae, weigh_advantages
 from cleanrl_style.protocol import run_folder
 
@@ -147,6 +147,17 @@ def test_advantages_are_normalised_per_objective_then_weighed():
 def make_curriculum(raw=False, seed=1, size=OBSERVATIONS, selector="network"):
     task = protocol.Task("sites-v0", {}, ("carbon", "thaw"), site_entries=tuple(range(43, size)))
     return Curriculum(task, Args(seed=seed, raw_selector=raw, selector=selector))
+
+
+@pytest.mark.parametrize("script", [ppo_curriculum, ppo_gated])
+def test_deviations_are_roots_that_every_processor_makes_alike(script):
+    advantages = torch.randn((64, 500), generator=torch.Generator().manual_seed(1))
+    mean = advantages.mean(dim=0)
+    variance = (advantages - mean).square().mean(dim=0).numpy()
+    exact = torch.from_numpy(np.sqrt(variance.astype(np.float64)).astype(np.float32))
+    weights = torch.eye(500)[:64]
+    expected = (weights * ((advantages - mean) / (exact + 1e-8))).sum(dim=1)
+    assert torch.equal(script.weigh_advantages(advantages, weights, np.arange(64)), expected)
 
 
 def test_scores_are_centred_and_scaled_over_sampled_sites():
