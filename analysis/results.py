@@ -242,10 +242,6 @@ class Results:
         )
         return [] if job is None else self.rows[job.row]
 
-    def expected(self, key: tuple) -> int:
-        """Replicates that the experiments have of a row."""
-        return len({(job.flags.get("seed", 1), job.flags.get("site_seed")) for job in self.jobs if job.row == key})
-
     def is_papers(self, key: tuple) -> bool:
         """Whether a row is one of the paper's: no control, and not of the balanced environment."""
         return key[2] == "default" or any(job.row == key for job in self.jobs if job.experiment in ("main", "fixed"))

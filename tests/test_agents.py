@@ -1,5 +1,6 @@
 """A trained policy, loaded again from its run's folder, plays as it did in the run's own evaluation."""
 
+import pickle
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,6 +11,7 @@ import pytest
 import torch
 from scripts import ROOT, run_script
 
+from analysis import score_policy
 from cleanrl_style import protocol
 from cleanrl_style.flags import policy_file
 from cleanrl_style.ppo_group import Agent
@@ -45,7 +47,9 @@ def test_the_agent_of_a_script_elsewhere(tmp_path):
     path = path.rename(tmp_path / "moved.py")
     with pytest.raises(FileNotFoundError, match="no cleanrl_style/ppo_own.py to import; script=path"):
         protocol.load_policy(tmp_path / "run")
-    evaluate_again(tmp_path / "run", protocol.load_policy(tmp_path / "run", script=path))
+    policy = protocol.load_policy(tmp_path / "run", script=path)
+    evaluate_again(tmp_path / "run", policy)
+    evaluate_again(tmp_path / "run", pickle.loads(pickle.dumps(policy)))
 
 
 def test_scripts_in_two_folders_have_each_its_own_helper(tmp_path):
@@ -83,6 +87,39 @@ def test_a_policy_that_could_not_be_loaded_is_not_written(tmp_path):
 def test_the_agent_of_one_preference_knows_it():
     observations = [protocol.load_policy("eupg_fixed_lambda").task().make().reset(seed=seed)[0] for seed in (1, 2)]
     assert [one[0] for one in observations] == [0.5, 0.5]
+
+
+@pytest.mark.parametrize("preference", [0.0, 1.0])
+def test_the_agent_of_one_objective_alone_is_loaded(preference, tmp_path):
+    saved = torch.load(policy_file("eupg_fixed_lambda"), weights_only=True)
+    saved["run"]["arguments"]["preference"] = preference
+    torch.save(saved, tmp_path / "policy.pt")
+    before = torch.get_rng_state()
+    assert protocol.load_policy(tmp_path / "policy.pt").task().env_kwargs["fixed_preference"] == preference
+    assert torch.equal(before, torch.get_rng_state())  # loading draws nothing of what is drawn later
+
+
+def test_the_task_of_an_agent_is_as_it_was_trained():
+    policy = protocol.load_policy("ppo_group")
+    hidden = replace(policy, arguments={**policy.arguments, "hide_site": True}, size=43)
+    assert hidden.task().make().observation_space.shape == (43,)
+    assert score_policy.task_of(hidden, "boreal-balanced-v0").make().observation_space.shape == (43,)
+    one = protocol.load_policy("eupg_fixed_lambda")
+    kept = replace(one, arguments={**one.arguments, "thaw_formulation": "contrast"}).task().env_kwargs
+    assert kept["thaw_formulation"] == "contrast" and kept["fixed_preference"] is not None
+
+
+def test_each_row_of_a_batch_has_an_action_of_its_own():
+    policy, observations, masks = protocol.load_policy("ppo_group"), np.zeros((40, 105)), np.ones((40, 25), bool)
+    assert len(set(policy.act(observations, masks, generator=np.random.default_rng(0)).tolist())) > 3
+    assert policy.act(observations[:1], masks[:1]).shape == (1,)
+
+
+def test_returns_accrued_so_far_are_of_all_objectives():
+    policy = protocol.load_policy("eupg_fixed_lambda")
+    three = replace(policy, arguments={**policy.arguments, "eval_weights": [[1, 0, 0]]})
+    with pytest.raises(ValueError, match=r"accrued_returns \(1, 3\) are allowed"):
+        three.act(np.zeros(105), np.ones(25, bool), [0.0, 0.0])
 
 
 def test_an_agent_of_another_network_is_refused(tmp_path):

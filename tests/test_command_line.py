@@ -9,6 +9,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import gymnasium as gym
 import matplotlib
@@ -298,6 +299,20 @@ def test_a_policy_that_does_not_play_its_evaluation_is_refused(run, tmp_path):
         score_policy.main(score_policy.Args(tmp_path, tasks=("boreal-site-specific-v0",), episodes=1))
 
 
+def test_not_only_the_first_episode_is_played_again(run, tmp_path):
+    shutil.copytree(run, tmp_path / "run")
+    policy, config = protocol.load_policy(run), json.loads((run / "config.json").read_text())
+    config["arguments"]["eval_episodes"] = 2
+    (tmp_path / "run" / "config.json").write_text(json.dumps(config))
+    table, _ = protocol.evaluate(policy.task(), policy.probabilities, config["arguments"]["eval_weights"], 2)
+    table.to_csv(tmp_path / "run" / "evaluation.csv", index=False)
+    assert "plays its evaluation again" in score_policy.check(policy, tmp_path / "run")
+    last = table.episode == table.episode.max()
+    table.assign(thaw_return=table.thaw_return + last).to_csv(tmp_path / "run" / "evaluation.csv", index=False)
+    with pytest.raises(ValueError, match="does not play what evaluation.csv says"):
+        score_policy.check(policy, tmp_path / "run")
+
+
 @pytest.mark.parametrize(
     "name, text, message",
     [
@@ -352,6 +367,7 @@ def test_episodes_of_other_numbers_are_refused(run, tmp_path, change, message):
     [
         (("nobody",), "nobody: neither the folder of a finished run"),
         (("ppo_group", "--episodes", "1", "--add"), "--add: a row of the leaderboard is of both tasks and all 200"),
+        (("ppo_group", "--tasks", "boreal-balanced-v0", "--add"), "--add: a row of the leaderboard is of both tasks"),
         (("ppo_group", "--episodes", "0"), "--episodes 0: 1 to 200 are allowed"),
         (("ppo_group", "--root", "/nowhere", "--add"), "--root /nowhere: no docs/leaderboard.md with"),
         (("ppo_group", "--name", "a|b"), r"--name 'a\|b': a cell of a table, without \|, is allowed"),
@@ -365,6 +381,38 @@ def test_a_policy_is_scored_with_good_flags_alone(given, message):
     with pytest.raises(SystemExit, match=f"^error: {message}") as refused:
         run_script("analysis/score_policy.py", *given)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("changed", "what"),
+    [
+        (
+            {"env_id": "boreal-site-specific-v0"},
+            "--add: a policy trained on boreal-generalist-v0 or boreal-balanced-v0",
+        ),
+        ({"site_seed": 3}, "--add: a policy trained on the task itself is allowed, not with another site_seed"),
+        ({"thaw_formulation": "contrast"}, "is allowed, not with another thaw_formulation"),
+    ],
+)
+def test_a_policy_of_another_task_is_no_row_of_the_leaderboard(changed, what, tmp_path, monkeypatch):
+    policy = protocol.load_policy("ppo_group")
+    other = replace(policy, arguments={**policy.arguments, **changed})
+    monkeypatch.setattr(protocol, "load_policy", lambda *_: other)
+    monkeypatch.setattr(protocol, "evaluate", None)  # refused before it plays
+    with pytest.raises(SystemExit, match=what):
+        score_policy.main(score_policy.Args(Path("ppo_group"), add=True, root=tmp_path))
+
+
+def test_a_row_has_both_scores_of_a_policy_that_was_played_twice(tmp_path, monkeypatch):
+    task, rows, repeated = score_policy.TASKS[1], [], []
+    by_weight = pd.DataFrame({"greedy": [1.0], "best": [2.0]})
+    played = SimpleNamespace(evaluation=None, by_weight=by_weight, score={"greedy": 10.0, "sampled": 20.0}.get)
+    monkeypatch.setattr(score_policy, "comparison", lambda *_: played)
+    monkeypatch.setattr(score_policy, "followed", lambda *_: "")
+    monkeypatch.setattr(score_policy, "check_repeats", lambda *given: repeated.append(given))
+    monkeypatch.setattr(score_policy, "add", lambda row, root: rows.append(row))
+    score_policy.main(score_policy.Args(Path("ppo_group"), tasks=(task,), add=True, root=tmp_path))
+    assert (rows[0][f"greedy, {task}"], rows[0][f"sampled, {task}"], len(repeated)) == (10, 20, 1)
 
 
 @pytest.mark.parametrize("command", [("analysis/score_policy.py", "nobody"), ("-m", "boreal_env", "watch", "nobody")])
@@ -393,9 +441,10 @@ def test_rows_go_into_the_leaderboard(tmp_path):
     page = tmp_path / score_policy.PAGE
     page.write_text("# Leaderboard\n<!-- leaderboard -->\n<!-- end of leaderboard -->\nend\n", encoding="utf-8")
     scores = dict.fromkeys(score_policy.SCORES, 50.0)
+    other = f"greedy, {score_policy.TASKS[0]}"  # does not rank
     for name, best in (("one", 60.0), ("two", 80.0), ("one", 90.0)):
         row = {"name": name, "script": "ppo", "trained on": "boreal-balanced-v0", "steps": 300000}
-        score_policy.add({**row, **scores, f"greedy, {score_policy.TASKS[1]}": best}, tmp_path)
+        score_policy.add({**row, **scores, f"greedy, {score_policy.TASKS[1]}": best, other: -best}, tmp_path)
     names = pd.read_csv(tmp_path / score_policy.TABLE).name.tolist()
     assert names == ["one", "two"]
     text = page.read_text(encoding="utf-8")
