@@ -2,11 +2,12 @@
 
     python analysis/execute_notebooks.py [--check]     # half a minute
 
-With --check nothing is written, and a notebook that would show other text is named; pictures are not compared, since
-another version of a library draws them otherwise. The same notebook gives the same bytes.
+With --check nothing is written, and a notebook that would show other text, or lacks a picture, is named; what pictures
+show is not compared, since another version of a library draws them otherwise. The same notebook gives the same bytes.
 """
 
 import difflib
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from sim.block import KERNELS
 
 FOLDER = Path(__file__).parents[1] / "docs" / "notebooks"
 LANGUAGE = {"name": "python"}
+INLINE = "module://matplotlib_inline.backend_inline"  # a backend of the shell's would leave no pictures
 KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
 
 
@@ -39,7 +41,7 @@ def executed(path: Path) -> nbformat.NotebookNode:
     """A notebook as it is when it has just been run from top to bottom in the repository."""
     notebook = nbformat.read(path, as_version=4)
     client = NotebookClient(notebook, timeout=3600, kernel_name="python3", record_timing=False)
-    client.execute(cwd=str(FOLDER.parents[1]))
+    client.execute(cwd=str(FOLDER.parents[1]), env=os.environ | {"MPLBACKEND": INLINE})
     notebook.metadata = {"kernelspec": KERNEL, "language_info": LANGUAGE}
     for cell in notebook.cells:
         cell.metadata = {}
@@ -47,12 +49,12 @@ def executed(path: Path) -> nbformat.NotebookNode:
 
 
 def shown(notebook: nbformat.NotebookNode) -> list[str]:
-    """The lines of text that a notebook's code shows."""
+    """The lines of text that a notebook's code shows, and one for each picture."""
     lines = []
     for cell in notebook.cells:
         for output in cell.get("outputs", []):
             text = output.get("text") or output.get("data", {}).get("text/plain", "")
-            lines += [line for line in text.splitlines() if not line.startswith("<Figure")]
+            lines += ["<Figure>" if line.startswith("<Figure") else line for line in text.splitlines()]
     return lines
 
 
