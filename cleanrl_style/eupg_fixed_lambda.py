@@ -187,7 +187,7 @@ if __name__ == "__main__":
         envs = run.make_envs()
 
         agent = Agent(envs, task.num_objectives)
-        optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate)
+        optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, fused=True)
 
         preferences = np.tile(task.preference, (args.num_envs, 1))
 

@@ -189,7 +189,7 @@ if __name__ == "__main__":
         envs = run.make_envs()
 
         agent = Agent(envs, task.num_objectives)
-        optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate)
+        optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, fused=True)
 
         # TRY NOT TO MODIFY: start the game
         iteration, global_step, episode, batch_steps = 0, 0, 0, 0
