@@ -8,7 +8,6 @@ import contextlib
 import os
 import re
 import shlex
-import signal
 import subprocess
 import sys
 import tempfile
@@ -142,6 +141,7 @@ class Report:
 # One command, where it runs
 # ---------------------------------------------------------------------------------------------------------------
 
+KILLED = -9  # the status of what was killed: not signal.SIGKILL, which Windows lacks
 _UNDER_WAY: set[subprocess.Popen] = set()
 _STOPPED = threading.Event()
 
@@ -151,7 +151,7 @@ def run(command: tuple[str, str, tuple[str, ...]]) -> tuple[int, str]:
     end of its output."""
     folder, log, words = command
     Path(log).parent.mkdir(parents=True, exist_ok=True)
-    status = -signal.SIGKILL
+    status = KILLED
     Path(log).unlink(missing_ok=True)
     with own_core() as core:
         for _ in range(1 + RETRIES):

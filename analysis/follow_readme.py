@@ -80,7 +80,7 @@ def main(args: Args) -> None:
     with protocol.replacing(args.results / "first_run.txt") as file:
         file.write(told[told.index("SCORE") :].encode())
     with protocol.replacing(args.results / "readme.csv") as file:
-        file.write(table.to_csv(index=False).encode())
+        file.write(table.to_csv(index=False, lineterminator="\n").encode())
     print(table.to_string(index=False))
 
 

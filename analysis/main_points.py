@@ -217,6 +217,7 @@ def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plan
         if len(rows[method]) > 1
     }
     over, even, under = ([method for method, side in beside.items() if side == which] for which in (1, 0, -1))
+    alone = [method for method in rows if len(rows[method]) == 1]
     below_it = "all are below 100" if len(under) == len(rows) else f"{len(under)} below 100"
     below_it += f", {methods.title(*best)} too" if best in under and len(under) < len(rows) else ""
     text = (
@@ -230,6 +231,7 @@ def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plan
         f"By both intervals, that of seeds and sites and that of seeds alone by t, {named(over)} above 100"
         + (f", {named(even)} not told apart from 100" if even else "")
         + (f", {below_it}" if under else "")
+        + (f", {named(alone)} of a single training, and not judged" if alone else "")
         + f"; {named(best_blind)} above 100 deciduous trees a year, {named(above)} above +100 a year, half conifers; "
         f"{named(below)} below that."
     )
@@ -281,7 +283,7 @@ def following(rows: dict[tuple[str, str], list]) -> str:
     )
     text += f", and {named(less_cold, 'keep')} less." if less_cold else "."
     text += f" {named(unmoved, 'do')} the same whatever is asked for." if unmoved else ""
-    told = "a change is named if neither interval, that over seeds and sites or that over seeds alone, holds 0"
+    told = "a change is named if neither interval, that over seeds and sites or that over seeds alone by t, holds 0"
     return f"{text} (Greedy policies; {told}.)"
 
 

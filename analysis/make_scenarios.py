@@ -141,7 +141,7 @@ def main(args: Args) -> None:
         }
         tables.append(pd.DataFrame(table))
     with replacing(FILE) as file:
-        file.write((SOURCE + pd.concat(tables).to_csv(index=False)).encode())
+        file.write((SOURCE + pd.concat(tables).to_csv(index=False, lineterminator="\n")).encode())
     print(f"wrote {FILE}")
 
 

@@ -96,7 +96,7 @@ def main(args: Args) -> None:
     if libraries and any(job.script in methods.OUTSIDE for job in jobs):
         jobs = [job for job in jobs if job.script not in methods.OUTSIDE]
         print(
-            f"not installed: {', '.join(libraries)} (pip install -e '.[outside]'); algorithms of other libraries are "
+            f'not installed: {", ".join(libraries)} (pip install -e ".[outside]"); algorithms of other libraries are '
             "left out",
             file=sys.stderr,
         )

@@ -17,7 +17,9 @@ def end_with_input() -> None:
     """End this process and those that it started when the standard input closes."""
     while os.read(0, 1024):
         pass
-    os.killpg(0, signal.SIGKILL)
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)
+    os._exit(1)  # on Windows, where what this process started ends by its own closed pipe
 
 
 if __name__ == "__main__":

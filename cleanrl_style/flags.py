@@ -83,7 +83,7 @@ def require(*packages: str, extra: str = "train") -> None:
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
         limit = " with Python 3.11 to 3.13" if "morl_baselines" in missing else ""  # see pyproject.toml
-        fail(f"not installed: {', '.join(missing)}; in the project's folder: pip install -e '.[{extra}]'{limit}")
+        fail(f'not installed: {", ".join(missing)}; in the project\'s folder: pip install -e ".[{extra}]"{limit}')
 
 
 def shipped_policies() -> dict[str, Path]:

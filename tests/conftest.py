@@ -1,5 +1,6 @@
 """What all tests share: hypothesis without a clock and without a database, so that a run can be repeated; Ctrl-C."""
 
+import os
 import signal
 
 from hypothesis import settings
@@ -22,6 +23,9 @@ def pytest_collection_modifyitems(items):
         if item.path.stem not in slow:
             item.add_marker("quick")
 
+
+# They kill processes as one can on Linux and macOS alone.
+collect_ignore = ["test_region_killed.py", "test_resume.py"] if os.name == "nt" else []
 
 # Bookkeeping is tested in steps of hours, for speed; that users may not is in test_simulate.py.
 stands.LONGEST_STEP_MINUTES = 1440

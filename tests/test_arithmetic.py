@@ -1,6 +1,7 @@
 """torch's numbers are the same on every x86-64 processor with AVX2 (cleanrl_style/__init__.py)."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -39,9 +40,20 @@ def trained(**settings):
     return done.stdout.split()
 
 
-@pytest.mark.skipif(not torch.__version__.startswith("2.13.0"), reason="the bytes are of torch 2.13.0")
+@pytest.mark.skipif(
+    not (sys.platform == "linux" and torch.__version__.startswith("2.13.0")), reason="the bytes are of torch 2.13.0"
+)
 def test_a_training_leaves_the_same_bytes_on_every_processor():
     assert trained() == ["f0838beb3cfd205e", "AVX2"]
+
+
+def test_every_script_that_trains_takes_the_optimiser_whose_roots_are_exact():
+    made = {
+        path.stem: re.findall(r"optim\.Adam\(.*", path.read_text()) for path in (ROOT / "cleanrl_style").glob("*.py")
+    }
+    with_one = {name: calls for name, calls in made.items() if calls}
+    assert {"eupg_fixed_lambda", "eupg_var_lambda", "ppo_curriculum", "ppo_gated", "ppo_group"} <= with_one.keys()
+    assert all("fused=True" in call for calls in with_one.values() for call in calls), with_one
 
 
 def test_what_the_user_has_set_stays():

@@ -62,7 +62,7 @@ def test_a_fixed_strategy_answers_as_soon():
 )
 def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, script, package, extra):
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(SystemExit, match=rf"^error: not installed: {package}; .*pip install -e '\.\[{extra}\]'$"):
+    with pytest.raises(SystemExit, match=rf"^error: not installed: {package}; .*pip install -e \"\.\[{extra}\]\"$"):
         run_script(script)
 
 

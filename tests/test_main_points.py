@@ -102,15 +102,15 @@ def test_the_words_follow_from_the_numbers(results):
     assert ahead == (
         "Of 5 trained methods Group PPO scores highest, 110.0 [105.0, 115.0] with 5 training seeds and a gain "
         "hypervolume of 2.50. Its score less that of 100 deciduous trees a year is 15.0. By both intervals, that of "
-        "seeds and sites and that of seeds alone by t, Group PPO is above 100, 3 below 100; none is above 100 "
-        "deciduous trees a year, Group PPO is above +100 a year, half conifers; Variable λ EUPG is below that. Few "
-        "training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
+        "seeds and sites and that of seeds alone by t, Group PPO is above 100, 3 below 100, MOEA/D is of a "
+        "single training, and not judged; none is above 100 deciduous trees a year, Group PPO is above +100 a year, "
+        "half conifers; Variable λ EUPG is below that. Few training seeds: MOEA/D 1. Not run yet: Curriculum PPO."
     )
     assert followed == (
         "Asked for carbon instead of thaw, PPO Gated and Group PPO store more carbon for it. Asked for thaw instead of "
         "carbon, Group PPO keeps more cold in the ground, and PPO Gated keeps less. Variable λ EUPG does the same "
         "whatever is asked for. (Greedy policies; a change is named if neither interval, that over seeds "
-        "and sites or that over seeds alone, holds 0.)"
+        "and sites or that over seeds alone by t, holds 0.)"
     )
 
 

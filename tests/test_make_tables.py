@@ -437,7 +437,10 @@ def test_what_a_choice_is_worth(tmp_path):
 
 
 def test_shares_of_the_best_known_plans(tmp_path, monkeypatch):
-    """On two sites, one of them searched: doing nothing has 0, the best plans 4 of thaw or 2 of carbon."""
+    """On two sites, one of them searched: doing nothing has 0, the best plans 4 of thaw or 2 of carbon.
+
+    Action 20 gains there, and loses more on the other site: over both the best constant plan is doing nothing.
+    """
     runs, nothing = tmp_path / "runs", (0,) * 5
     weights = best_known.WEIGHTS
     write_run(runs / "zero", "zero_change", carbon=nothing, thaw=nothing, weights=weights)
@@ -453,6 +456,11 @@ def test_shares_of_the_best_known_plans(tmp_path, monkeypatch):
         for k, (plan, c, t) in enumerate(plans)
     ]
     stored.write(tmp_path / "studies" / "best_plans" / f"{MAIN[1]}.csv", pd.DataFrame(rows), {})
+    everywhere = [
+        {"env_id": MAIN[1], "action": action, "seed": seed, "carbon_return": carbon, "thaw_return": 0.0}
+        for seed, action, carbon in ((0, 12, 0.0), (0, 20, 1.0), (1, 12, 0.0), (1, 20, -3.0))
+    ]
+    stored.write(tmp_path / "studies" / "constant_plans.csv", pd.DataFrame(everywhere), {})
     monkeypatch.setattr(paths, "studies", lambda quick: tmp_path / "studies")
     make(runs, tmp_path / "tables")
     table = read(tmp_path / "tables", "best_known", ["method", "policy"])
@@ -464,7 +472,8 @@ def test_shares_of_the_best_known_plans(tmp_path, monkeypatch):
     assert table.loc[("ppo_gated", "sampled")].nhgr == 1 and row.nhgr == 0
     assert 0 < row.eugr < 1
     for name in best_known.BLIND:
-        assert table.xs(name).iloc[0][["share_0", "share_1"]].tolist() == pytest.approx([0, 50])
+        carbon = 0 if name == "best_constant_mix" else 50
+        assert table.xs(name).iloc[0][["share_0", "share_1"]].tolist() == pytest.approx([0, carbon])
 
 
 def test_the_score_of_three_objectives(tmp_path, monkeypatch):

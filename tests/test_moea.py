@@ -189,5 +189,5 @@ def test_what_cannot_be_searched_is_refused(arguments, message, tmp_path):
 def test_without_pymoo_it_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymoo", None)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "pymoo" else name)
-    with pytest.raises(SystemExit, match=r"not installed: pymoo; .* pip install -e '\.\[planners\]'"):
+    with pytest.raises(SystemExit, match=r"not installed: pymoo; .* pip install -e \"\.\[planners\]\""):
         search(tmp_path / "run")

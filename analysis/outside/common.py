@@ -6,7 +6,6 @@ in which it can take valid actions alone: random ones are drawn from them, and a
 """
 
 import random
-import resource
 import sys
 import time
 from collections.abc import Callable
@@ -19,6 +18,11 @@ import torch
 
 from analysis.outside.arguments import Args
 from cleanrl_style import protocol
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 INVALID = -1e8  # as a value or a logit: never the highest, and its probability is exactly 0
 COST_COLUMNS = ("steps", "own_evaluation_steps", "peak_memory_mb")
@@ -209,9 +213,15 @@ def main(script: str, args: Args, learn: Callable, samples: bool, check: Callabl
         if not samples:
             tables = [as_both(table) for table in tables]
         run.time("evaluation", steps, time.perf_counter() - start)
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
-        run.log("cost", {"steps": steps, "own_evaluation_steps": own, "peak_memory_mb": round(memory)})
+        run.log("cost", {"steps": steps, "own_evaluation_steps": own, "peak_memory_mb": peak_memory_mb()})
         run.finish(*tables)
+
+
+def peak_memory_mb() -> float:
+    """The largest memory of this process [MiB]; NaN on Windows, which does not say it so."""
+    if resource is None:
+        return np.nan
+    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10))
 
 
 def as_both(table: pd.DataFrame) -> pd.DataFrame:

@@ -12,7 +12,7 @@ from analysis import metrics, stored
 from analysis.best_plans import unchanging
 from analysis.generalisation import RATIOS, judged
 from analysis.results import PAIR
-from analysis.studies.constant_plans import DECIDUOUS, ENVIRONMENTS
+from analysis.studies.constant_plans import DECIDUOUS, ENVIRONMENTS, as_evaluation
 from analysis.tables.common import ROW_COLUMNS, over_seeds, row_of
 from cleanrl_style.protocol import reference
 from cleanrl_style.protocol.fronts import evaluation_weights
@@ -86,20 +86,27 @@ def rows_of(results, env_id: str, plans: pd.DataFrame) -> list[dict]:
         for key, policy in dict.fromkeys(name[:2] for name in found):
             of_row = pd.DataFrame([numbers[name] for name in found if name[:2] == (key, policy)])
             rows.append(row_of(key, len(of_row)) | {"policy": policy, "sites": len(seeds)} | over_seeds(of_row))
-    for name, gained in of_blind_plans(constant).items():
+    for name, gained in of_blind_plans(constant, results.constant_plans_in(env_id, "asymmetric", None)).items():
         row = row_of((name, env_id, "default"), np.nan) | {"sites": len(seeds)}
         row |= {f"share_{weight:g}": 100 * gained[weight] / best[weight].mean() for weight in WEIGHTS}
         rows.append(row | {"share": 100 * gained.mean() / best.mean().mean()})
     return rows
 
 
-def of_blind_plans(constant: pd.DataFrame) -> dict[str, pd.Series]:
-    """Gain at each weight of the rows `BLIND`, mean over sites; constant : gains of the constant plans there."""
+def of_blind_plans(constant: pd.DataFrame, everywhere: pd.DataFrame | None) -> dict[str, pd.Series]:
+    """Gain at each weight of the rows `BLIND`, mean over sites.
+
+    constant : gains of the constant plans there; everywhere : their returns on all the sites of the score, on which
+    that of each weight is chosen, as the score does; None where they are not measured, without that row then.
+    """
     returns = constant[metrics.return_columns(PAIR)].to_numpy()
     gained = pd.DataFrame({weight: returns @ metrics.pair(weight) for weight in WEIGHTS})
     of_plans = gained.groupby(constant.plan.to_numpy()).mean()
-    means = (of_plans.loc[DENSE_DECIDUOUS], of_plans.max(), best_at(constant, WEIGHTS).mean())
-    return dict(zip(BLIND, means, strict=True))
+    rows = {"dense_deciduous": of_plans.loc[DENSE_DECIDUOUS]}
+    if everywhere is not None:
+        chosen = by_weight(as_evaluation(everywhere, WEIGHTS)).plan.first()
+        rows["best_constant_mix"] = pd.Series({w: of_plans.at[unchanging(plan), w] for w, plan in chosen.items()})
+    return rows | {"best_constant_of_site": best_at(constant, WEIGHTS).mean()}
 
 
 def make(results) -> pd.DataFrame:

@@ -56,7 +56,8 @@ def compile_apart(lanes: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # not the training's way to stop
     LOGGER.disabled = True
-    os.nice(5)
+    if hasattr(os, "nice"):  # not on Windows
+        os.nice(5)
     kernel(lanes)
 
 

@@ -605,7 +605,8 @@ def commit() -> str | None:
     if not (root / ".git").exists():
         return None
     try:
-        head = subprocess.run(["git", "-C", root, "rev-parse", "HEAD"], capture_output=True, text=True)
+        command = ["git", "-C", root, "rev-parse", "HEAD"]
+        head = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
     except FileNotFoundError:
         return None
     return head.stdout.strip() if head.returncode == 0 else None

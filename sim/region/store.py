@@ -101,6 +101,8 @@ class Store:
 
     def __exit__(self, kind, error, trace) -> None:
         if self.lock is not None:
+            if fcntl is None:  # Windows deletes no open file
+                self.lock.close()
             if self.path.exists():
                 shutil.rmtree(self.partial)
             self.lock.close()
