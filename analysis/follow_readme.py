@@ -21,7 +21,7 @@ from analysis.paths import make_writable
 from cleanrl_style import protocol
 
 ROOT = Path(__file__).parents[1]
-CLONE = "git clone <URL of this repository>"
+CLONE = "git clone --depth 1 <URL of this repository>"
 QUICK = "pytest -m quick"  # named below that block
 
 
@@ -46,7 +46,7 @@ def steps(lines: list[str]) -> list[str]:
 
 def prepare(folder: Path) -> dict[str, str]:
     """A clone and a virtual environment, which all commands then run in; what has to be in their environment."""
-    subprocess.run(["git", "clone", "--quiet", ROOT, folder], check=True)
+    subprocess.run(["git", "clone", "--quiet", "--depth", "1", ROOT.as_uri(), folder], check=True)
     subprocess.run(["python3", "-m", "venv", folder / ".venv"], check=True)
     path = f"{folder / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}"
     kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
