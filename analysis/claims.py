@@ -80,7 +80,9 @@ between runs of one script, and between Curriculum and PPO Gated, which train on
 side's seeds are its own. Returns are sums over 50 years; gains are returns less those of zero change on the same
 episodes. What is over sites or episodes is a mean with its 95 % t interval, a correlation with Fisher's, a share with
 Wilson's, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
-pairs of stands are compared the active layer stands beside it.
+pairs of stands are compared the active layer stands beside it. The paper's boundary is the top of the permafrost table:
+claims on how much the site decides, on scatter between episodes and on warming fluxes hang on that depth, too. The
+paper trained a single agent for all sites; its ± is over episodes.
 
 **Kinds and votes.** Claims of the paper are sorted by what they are about, and every fact has one vote: a claim that
 states another's fact once more names it and has none. A level, a return or a density of another simulator, is set

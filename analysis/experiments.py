@@ -25,6 +25,7 @@ STUDIES = (
     "signal_to_noise",
     "gradient_noise",
 )
+UNMASKED = ("plus_100", "target_density", "conifer_restoration")
 READING = ("site_warming",)  # studies that read the runs before them
 WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SITE_SEEDS = (1, 2, 3, 4, 5)
@@ -126,10 +127,14 @@ def seeds_of(number: int, chosen: list[int] | None) -> list[int]:
 
 
 def main_table(seeds) -> list[Job]:
-    """Heuristics and constant plans, then the methods, a seed of all before the next."""
+    """Heuristics and constant plans, then the methods, a seed of all before the next.
+
+    The paper's strategies that plant or cut are played without masks, too: its PPOs alone have masks.
+    """
     methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in LEARNERS]
     fixed = [Job("main", script) for script in (*STRATEGIES, "constant_plans")]
-    return [*fixed, *methods]
+    unmasked = [Job("main", script, {"masks": False}) for script in UNMASKED]
+    return [*fixed, *unmasked, *methods]
 
 
 def balanced(seeds) -> list[Job]:

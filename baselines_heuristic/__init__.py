@@ -21,6 +21,8 @@ class Args:
     """another fixed site in site-specific mode; in generalist mode one site, under new weather in every episode"""
     thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] | None = None
     """formula of the thaw reward (None: the environment's, asymmetric)"""
+    masks: bool = True
+    """do nothing in a year whose action the mask forbids; without masks it is played, and penalised"""
     eval_episodes: int = 200
     """evaluation episodes per weight, each on a site of its own"""
     eval_weights: tuple[float, ...] | None = None
@@ -31,10 +33,11 @@ class Args:
     """start over in a folder that already holds a run"""
 
 
-def obeying(policy):
+def obeying(policy, masked: bool = True):
     """A strategy as it is played: probabilities (n, 25), of observations (n, d) and masks (n, 25).
 
-    policy gives actions (n,), or probabilities already. Where the mask forbids its action, nothing is done.
+    policy gives actions (n,), or probabilities already. Where the mask forbids its action, nothing is done; not masked,
+    it is played.
     """
     import numpy as np
 
@@ -44,7 +47,7 @@ def obeying(policy):
         chosen = policy(observations, masks)
         if chosen.ndim == 2:
             return chosen
-        return np.eye(25)[where_valid(chosen, masks)]
+        return np.eye(25)[where_valid(chosen, masks) if masked else chosen]
 
     return probabilities
 
@@ -75,7 +78,11 @@ def main(script: str, policy) -> None:
         groups = ", ".join(group for group in boreal_env.OBSERVATION_GROUPS if group != "site")
         protocol.fail(f"--env-id {args.env_id}: fixed strategies look at {groups}; observation_groups must have them")
 
-    played = obeying(policy)
+    if not args.masks and policy(np.zeros((1, len(seen))), np.ones((1, 25), bool)).ndim == 2:
+        protocol.fail(
+            "--no-masks: actions of this strategy are drawn from the valid ones; it is for those that name one"
+        )
+    played = obeying(policy, args.masks)
 
     def action_probabilities(observations, masks, accrued_returns):
         # laid out as for two objectives, whatever their number: a strategy does not look at the weights

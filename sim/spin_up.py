@@ -38,7 +38,7 @@ BOUNDARY = "deep_boundary_temperature_k"
 
 #: First soil carbon: drawn, or what the litter of the first stand keeps up.
 SOIL_CARBONS = ("drawn", "balanced")
-LEAST_SOIL_KGC = 2.0  # the least that the paper draws: ground that has no trees now had some before
+LEAST_SOIL_KGC = 2.0  # the least that is drawn: ground that has no trees now had some before
 
 #: Ranges that the first stocks are drawn from. Biomass is drawn within what the stems can hold, and their age follows
 #: from it, unless `oldest_age_years` is given or a range of it.

@@ -182,7 +182,7 @@ def test_a_fact_has_one_vote():
     assert {one.kind for one in every} == {*KINDS}
     findings = {one: claims.Finding([], HOLDS) for one in every}
     assert sum(claims.votes(findings, kind).total() for kind in KINDS) == len(every) - len(again)
-    assert sum(one.repeats is performance.curriculum_beats_gated for one in again) == 7
+    assert sum(one.repeats is performance.curriculum_beats_gated for one in again) == 5
     assert not any(one.kind == LEVEL for one in again)
 
 
@@ -287,10 +287,12 @@ def test_no_difference_is_not_reproduced(tmp_path):
 def test_heuristics_are_paired_over_episodes(tmp_path):
     write_run(tmp_path / "zero", "zero_change", carbon=(0,) * 3, thaw=(0,) * 3)
     write_run(tmp_path / "plus", "plus_100", carbon=(1,) * 3, thaw=(2,) * 3)
+    write_run(tmp_path / "penalised", "plus_100", carbon=(-4,) * 3, thaw=(2,) * 3, masks=False)
     finding, ours = found(performance.planting_is_worst, tmp_path)
-    # gains 1 and 2 on both episodes: 1.5 over symmetric weights
-    assert ours["scalarised, +100 a year less zero change"].ends == (1.5, 1.5)
-    assert finding.verdict == FAILS
+    # gains 1 and 2 on both episodes: 1.5 over symmetric weights; the paper's plant on when a stand is full, and pay
+    assert ours[performance.OBEYING].ends == (1.5, 1.5)
+    assert ours["scalarised, +100 a year less zero change"].ends == (-1.0, -1.0)
+    assert (finding.verdict, finding.remark) == (HOLDS, f"Of strategies that obey masks: {FAILS}.")
 
 
 def test_that_management_can_is_shown_by_one_strategy_that_does(tmp_path):
@@ -600,6 +602,8 @@ def test_a_partial_archive_has_a_verdict_where_it_can(tmp_path):
     """Three seeds of one method, fixed strategies, and nothing else: no claim on a training is judged."""
     for script in methods.STRATEGIES:
         write_run(tmp_path / "runs" / script, script)
+    for script in experiments.UNMASKED:
+        write_run(tmp_path / "runs" / f"{script} unmasked", script, masks=False)
     for seed in (1, 2, 3):
         write_run(tmp_path / "runs" / str(seed), "ppo_gated", seed, vectorization="lockstep")
     results = results_of(tmp_path / "runs", tmp_path / "studies")
@@ -608,4 +612,4 @@ def test_a_partial_archive_has_a_verdict_where_it_can(tmp_path):
     gated = claims.judge(performance.gated_beats_heuristics, Evidence(results))
     assert gated.verdict == UNDECIDED and gated.waits
     assert claims.judge(performance.curriculum_beats_gated, Evidence(results)).verdict == NO_RUNS
-    assert re.search(r"\| `main` \| 8 \| \d+ \| `constant_plans` \(not yet\)", text)
+    assert re.search(r"\| `main` \| 11 \| \d+ \| `constant_plans` \(not yet\)", text)

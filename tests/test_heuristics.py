@@ -102,6 +102,24 @@ def test_planting_every_year_is_the_constant_plan(tmp_path):
     np.testing.assert_allclose(written[["carbon_return", "thaw_return"]], plan[["carbon_return", "thaw_return"]], 1e-4)
 
 
+def test_without_masks_forbidden_actions_are_played_and_penalised(tmp_path):
+    """From a full stand on, +100 pays for planting every year."""
+    run_script("baselines_heuristic/plus_100.py", "--no-masks", "--run-dir", tmp_path, "--eval-episodes", 2)
+    written = pd.read_csv(tmp_path / "evaluation.csv").drop_duplicates("seed")
+    task = protocol.Task.of("boreal-generalist-v0")
+    envs = task.make_lockstep(2)
+    envs.reset(seed=written.seed.tolist())
+    returns = np.sum([envs.step(np.full(2, 22))[1] for _ in range(50)], axis=0)
+    np.testing.assert_allclose(written[["carbon_return", "thaw_return"]], returns, rtol=1e-5)
+    assert (returns[:, 0] < -10).all()
+
+
+def test_random_actions_have_no_masks_to_leave_out(tmp_path):
+    with pytest.raises(SystemExit, match="--no-masks: actions of this strategy are drawn from the valid ones"):
+        run_script("baselines_heuristic/random_valid.py", "--no-masks", "--run-dir", tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
 def test_users_environments_are_refused(tmp_path):
     with pytest.raises(SystemExit, match="fixed strategies know the boreal environments alone"):
         run_script("baselines_heuristic/zero_change.py", "--env-id", "toy_env:toy-v0", "--run-dir", tmp_path / "run")

@@ -13,7 +13,7 @@ from cleanrl_style import protocol
 from cleanrl_style.ppo_gated import Args
 
 COUNTS = {
-    "main": 1 + len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
+    "main": 1 + len(methods.STRATEGIES) + len(experiments.UNMASKED) + 10 * len(methods.LEARNERS),
     "balanced": len(methods.STRATEGIES) + 10 * len(methods.LEARNERS),
     "group": 35,
     "outside": 10 * len(methods.OUTSIDE),
@@ -139,6 +139,7 @@ def test_what_trains_nothing_can_be_run_alone(capsys):
     assert capsys.readouterr().out.splitlines() == [
         *strategies,
         "python analysis/studies/constant_plans.py",
+        *(f"python baselines_heuristic/{script}.py --no-masks" for script in experiments.UNMASKED),
         *(f"{line} --env-id boreal-balanced-v0" for line in strategies),
     ]
 

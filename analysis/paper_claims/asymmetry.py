@@ -46,6 +46,12 @@ FEWEST_SITES = 5
 NOT_PAIRED = "the same, seeds not paired"
 LIMIT = "That a quarter of what the best constant plan gains counts as learnt is our choice; how fast is not judged."
 
+#: What the paper adds to what its thaw agents do.
+LACK_OF_LEARNING = (
+    'The paper adds that "no strong conclusion can be drawn about the thaw policies as they may be a conservative '
+    'result of lack of learning".'
+)
+
 
 def less_nothing(evidence, evaluation: pd.DataFrame, objective: str) -> float:
     """Mean of a return less that of doing nothing on the same episodes."""
@@ -247,6 +253,7 @@ def carbon_density(evidence):
     "Thaw agents stay at 1000 to 1020 stems/ha.",
     "Section 4.2, figure 2c",
     FIXED,
+    note=LACK_OF_LEARNING,
     kind=LEVEL,
 )
 def thaw_density(evidence):
@@ -261,6 +268,7 @@ def thaw_density(evidence):
     "Carbon agents end with denser stands than thaw agents.",
     "Section 4.2, figure 2c",
     FIXED,
+    note=LACK_OF_LEARNING,
 )
 def carbon_is_denser(evidence):
     apart = difference(at_the_end(evidence, CARBON, "final_density"), at_the_end(evidence, THAW, "final_density"))
@@ -291,6 +299,7 @@ def carbon_keeps_species(evidence):
     "Section 4.2, figure 2d",
     FIXED,
     why="Conifers build the thicker organic layer here, which insulates more when thawed than when frozen.",
+    note=LACK_OF_LEARNING,
 )
 def thaw_goes_deciduous(evidence):
     fraction = seeds(at_the_end(evidence, THAW, "final_conifer_fraction"))

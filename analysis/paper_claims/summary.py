@@ -51,10 +51,12 @@ SENTENCES = (
     Sentence(
         performance.gated_beats_heuristics,
         "PPO Gated less the best of them",
-        "PPO Gated is better than every fixed strategy",
+        "PPO Gated is better than each of the paper's fixed strategies, whose forbidden actions are played and "
+        "penalised",
         "PPO Gated is no better than the best of the paper's fixed strategies, which look at nothing or at the density "
         "alone",
         "Whether PPO Gated is better than every fixed strategy is open",
+        beside=performance.OBEYING,
     ),
     Sentence(
         preference.curriculum_follows,
@@ -90,14 +92,17 @@ SENTENCES = (
         mechanisms.stems,
         "thaw return without interception",
         "Stems store carbon, help permafrost by the snow that they catch and harm it by what they absorb",
-        "The paper says that stems store carbon, help permafrost by the snow that they catch (its table says the "
-        "opposite) and harm it by what they absorb; not all of it holds here",
+        "The paper says that dense stands store carbon, help permafrost by the snow that they catch (its table says "
+        "the opposite) and can harm it by what they absorb; not all of it holds here",
         "Stems and permafrost: part of what the paper says is open",
     ),
     Sentence(
         paper_itself.heuristic_hypervolumes,
         "hypervolume, Zero change (scalarised −2.5)",
-        *("The paper does not say what its hypervolumes are of; those of its heuristics cannot be of mean returns",)
+        *(
+            "The paper computes its hypervolumes over 100 episodes a weight, and does not say of which points; those "
+            "of its heuristics cannot be of mean returns",
+        )
         * 3,
     ),
 )
@@ -113,7 +118,7 @@ def counted(verdicts: Counter, reached: list[float]) -> str:
     open_ = verdicts.total() - verdicts[HOLDS] - verdicts[FAILS]
     numbers = verdicts[FAILS] - small
     return (
-        f"The paper states {verdicts.total()} facts about what comes out ahead or which way a mechanism works. Here "
+        f"We read {verdicts.total()} facts in the paper on what comes out ahead or which way a mechanism works. Here "
         f"{verdicts[HOLDS]} hold, {verdicts[FAILS]} do not, and {open_} are open or cannot be tested. Of the "
         f"{verdicts[FAILS]} that do not, {numbers} fail since our numbers say otherwise, and {small} since what is "
         f"left of the effect is too small: less than a quarter of what [its rule](#how-it-is-judged) measures it by. "
