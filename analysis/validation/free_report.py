@@ -69,7 +69,7 @@ QUANTITIES = {
         "kgC m-2",
         lambda run: run.annual["biomass_kgc_m2"],
         1,
-        f"light use; {THINNED}",
+        f"litter is a share of wood, too, which bounds what a stand can hold; {THINNED}",
         "few trees die; young trees lose little litter",
     ),
     "density": Quantity(
