@@ -215,6 +215,7 @@ def distances(results: Results) -> str:
     columns = {f"share_{weight:g}": f"{weight:g}" for weight in best_known.WEIGHTS} | {"share": "all"}
     shown = (*methods.TRAINED, "plus_100", *best_known.BLIND)
     table = table[table.method.isin(shown) & (table.policy != "sampled")]
+    table = table[table.method.isin(methods.TRAINED) | (table.setting == "default")]
     if table.empty:
         return not_run("main")
     cells = []
