@@ -82,7 +82,8 @@ episodes. What is over sites or episodes is a mean with its 95 % t interval, a c
 Wilson's, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
 pairs of stands are compared the active layer stands beside it. The paper's boundary is the top of the permafrost table:
 claims on how much the site decides, on scatter between episodes and on warming fluxes hang on that depth, too. The
-paper trained a single agent for all sites; its ± is over episodes.
+paper trained a single agent for all sites; its ± is over episodes. All trained methods choose among valid actions here,
+EUPG too, for which the paper names no mask: what is said of EUPG is of one that pays no penalty for invalid actions.
 
 **Kinds and votes.** Claims of the paper are sorted by what they are about, and every fact has one vote: a claim that
 states another's fact once more names it and has none. A level, a return or a density of another simulator, is set

@@ -129,7 +129,7 @@ def seeds_of(number: int, chosen: list[int] | None) -> list[int]:
 def main_table(seeds) -> list[Job]:
     """Heuristics and constant plans, then the methods, a seed of all before the next.
 
-    The paper's strategies that plant or cut are played without masks, too: its PPOs alone have masks.
+    The paper's strategies that plant or cut are played without masks, too: it names masks for its PPOs alone.
     """
     methods = [trained("main", script, seed) for seed in seeds_of(10, seeds) for script in LEARNERS]
     fixed = [Job("main", script) for script in (*STRATEGIES, "constant_plans")]

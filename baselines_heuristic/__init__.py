@@ -22,7 +22,8 @@ class Args:
     thaw_formulation: Literal["asymmetric", "contrast", "raw_degree_days"] | None = None
     """formula of the thaw reward (None: the environment's, asymmetric)"""
     masks: bool = True
-    """do nothing in a year whose action the mask forbids; without masks it is played, and penalised"""
+    """do nothing in a year whose action cannot be carried out in full; without masks what can be done of it is done,
+    and the rest costs carbon reward (not for random_valid.py)"""
     eval_episodes: int = 200
     """evaluation episodes per weight, each on a site of its own"""
     eval_weights: tuple[float, ...] | None = None

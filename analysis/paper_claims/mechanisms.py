@@ -465,8 +465,8 @@ def trade_off(evidence):
     "Management can enhance the protection of permafrost.",
     "Abstract; section 5",
     MAIN,
-    note="One strategy that does shows that management can. Judged by planting, a strategy of the paper's that was not "
-    "sought for a site: the best of many plans gains nearly by construction.",
+    note="Strategies obey masks here, as in our tables. One that does shows that management can. Judged by planting, a "
+    "strategy of the paper's that was not sought for a site: the best of many plans gains nearly by construction.",
 )
 def management_protects(evidence):
     gain, share = thaw_gain(evidence, "plus_100")

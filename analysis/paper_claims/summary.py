@@ -51,11 +51,11 @@ SENTENCES = (
     Sentence(
         performance.gated_beats_heuristics,
         "PPO Gated less the best of them",
-        "PPO Gated is better than each of the paper's fixed strategies, whose forbidden actions are played and "
-        "penalised",
+        "PPO Gated is better than each of the paper's fixed strategies",
         "PPO Gated is no better than the best of the paper's fixed strategies, which look at nothing or at the density "
         "alone",
-        "Whether PPO Gated is better than every fixed strategy is open",
+        "Whether PPO Gated is better than each of the paper's fixed strategies hangs on whether those obey masks, "
+        "which the paper does not say",
         beside=performance.OBEYING,
     ),
     Sentence(
