@@ -55,7 +55,8 @@ MEANING = {
     COMPARED: "a level of another simulator, beside ours",
     CONTRADICTS: "another number of the paper, or its own definitions, exclude it",
     UNTESTABLE: "what it needs is not logged, or not there",
-    UNDECIDED: f"the interval leaves both open, or there are fewer than {FEWEST_SEEDS} training seeds",
+    UNDECIDED: f"the interval leaves both open, two readings of the paper part, or there are fewer than {FEWEST_SEEDS} "
+    "training seeds",
     NO_RUNS: "what it needs has not been run",
 }
 
@@ -96,10 +97,10 @@ quarter of what the best plans' return changes by from weight 0 to 1, of what ha
 effect. That is much: planting 100 stems a year blindly and the best constant plan are less far apart. Beyond that signs
 are judged, not sizes: how large the paper's difference is stands beside ours. A value or a range is met if all of our
 interval lies in it, give or take a tenth, and not if all of it lies outside. A cost is met if ours is no larger. A
-claim of several parts does not hold if one of them does not. A bootstrap over few seeds is too narrow (of normal values
-it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five, and for the t interval of the seeds'
-mean to agree. Dozens of intervals are judged one by one, uncorrected. Those over training seeds hold for these
-evaluation sites: other sites are another matter.
+claim of several parts does not hold if one of them does not, and one that can be read in two ways is undecided where
+the two part. A bootstrap over few seeds is too narrow (of normal values it covers nine tenths with five seeds instead
+of 95 %), so verdicts ask for five, and for the t interval of the seeds' mean to agree. Dozens of intervals are judged
+one by one, uncorrected. Those over training seeds hold for these evaluation sites: other sites are another matter.
 """
 
 

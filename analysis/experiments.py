@@ -25,7 +25,6 @@ STUDIES = (
     "signal_to_noise",
     "gradient_noise",
 )
-UNMASKED = ("plus_100", "target_density", "conifer_restoration")
 READING = ("site_warming",)  # studies that read the runs before them
 WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SITE_SEEDS = (1, 2, 3, 4, 5)
@@ -33,6 +32,7 @@ SITE_SEEDS = (1, 2, 3, 4, 5)
 # yr-1; the paper's rewards are at 2.0, so the carbon reward times 2.0 / 1.8
 REWARD_SCALES = (1.11, 1.0)
 OTHERS = {"baseline": "others", "num_envs": 8}  # of EUPG: the mean of a batch's other episodes
+UNMASKED = ("plus_100", "target_density", "conifer_restoration")  # fixed strategies that a mask can forbid something
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,8 @@ def test_a_training_leaves_the_same_bytes_on_every_processor():
 
 def test_every_script_that_trains_takes_the_optimiser_whose_roots_are_exact():
     made = {
-        path.stem: re.findall(r"optim\.Adam\(.*", path.read_text()) for path in (ROOT / "cleanrl_style").glob("*.py")
+        path.stem: re.findall(r"optim\.Adam\(.*", path.read_text(encoding="utf-8"))
+        for path in (ROOT / "cleanrl_style").glob("*.py")
     }
     with_one = {name: calls for name, calls in made.items() if calls}
     assert {"eupg_fixed_lambda", "eupg_var_lambda", "ppo_curriculum", "ppo_gated", "ppo_group"} <= with_one.keys()

@@ -324,7 +324,7 @@ def conflict_claim(variable: str, start: str, statement: str, rule, why: str, *b
     pair = next(name for name in PAIRS if name.startswith(start))
     others = [name for name in PAIRS if name.startswith(beside)] if beside else []
 
-    @claim(statement, "Table of physical conflicts", STUDY, **{"why" if rule else "note": why})
+    @claim(statement, "Table of physical conflicts", STUDY, why=why if rule else "", note="" if rule else why)
     def conflict(evidence):
         carbon, thaw = (effect(evidence, pair, f"{name}_return") for name in ("carbon", "thaw"))
         rows = [Row(f"carbon return, {pair}", table.carbon, carbon), Row("thaw return", table.permafrost, thaw)]

@@ -10,6 +10,7 @@ from analysis.paper_claims.claim import (
     CONTROL,
     LEAST,
     QUARTER,
+    Answer,
     Number,
     Row,
     Undefined,
@@ -71,20 +72,24 @@ def paper_change(script: str) -> tuple[float, float]:
     return tuple(table[f"{name}_mean"].iloc[-1] - table[f"{name}_mean"].iloc[0] for name in ("carbon", "thaw"))
 
 
+def changes(evidence, script: str) -> tuple[list[Row], Answer]:
+    """Lines of how far a method's returns follow the preference, beside the paper's, and whether they do."""
+    carbon, thaw, answer = follows(evidence, "main", script)
+    papers = paper_change(script)
+    return [
+        Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
+        Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw),
+    ], answer
+
+
 @claim(
     "Curriculum PPO follows the preference.",
     "Figure 3d; table of detailed objectives",
     only("main", "variants"),
 )
 def curriculum_follows(evidence):
-    carbon, thaw, answer = follows(evidence, "main", CURRICULUM)
-    papers = paper_change(CURRICULUM)
-    rows = [
-        Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
-        Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw),
-    ]
-    rows += apart_rows(evidence)
-    return finding(rows, answer)
+    rows, answer = changes(evidence, CURRICULUM)
+    return finding(rows + apart_rows(evidence), answer)
 
 
 def apart_rows(evidence) -> list[Row]:
@@ -100,19 +105,20 @@ def apart_rows(evidence) -> list[Row]:
     ]
 
 
-@claim(
-    "Standard preference-conditioned PPO fails to follow the preference.",
-    "Abstract; section 4.3",
-    MAIN,
+def fails_to_follow(script: str, statement: str, where: str):
+    """The claim that a method does not follow the preference."""
+
+    @claim(statement, where, MAIN)
+    def does_not_follow(evidence):
+        rows, answer = changes(evidence, script)
+        return finding(rows, opposite(answer))
+
+    return does_not_follow
+
+
+gated_does_not_follow = fails_to_follow(
+    GATED, "Standard preference-conditioned PPO fails to follow the preference.", "Abstract; section 4.3"
 )
-def gated_does_not_follow(evidence):
-    carbon, thaw, answer = follows(evidence, "main", GATED)
-    papers = paper_change(GATED)
-    rows = [
-        Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
-        Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw),
-    ]
-    return finding(rows, opposite(answer))
 
 
 @claim(

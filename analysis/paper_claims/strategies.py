@@ -19,12 +19,11 @@ from analysis.paper_claims.claim import (
     below,
     claim,
     finding,
-    opposite,
     short,
 )
 from analysis.paper_claims.evidence import difference, first_and_last, only, optional, seeds, unpaired
 from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED, curriculum_beats_gated
-from analysis.paper_claims.preference import APART, change, follows, paper_change
+from analysis.paper_claims.preference import APART, change, fails_to_follow
 from analysis.results import by_year
 from analysis.tables.common import paper
 from analysis.tables.learned_strategies import numbers
@@ -290,19 +289,9 @@ def both_gain_more_carbon(evidence):
     return finding(rows, all_of(*(above(number, least=LEAST, what="each difference") for number in apart.values())))
 
 
-@claim(
-    "Variable λ EUPG fails to follow the preference.",
-    "Abstract; table of learned strategies",
-    MAIN,
+eupg_does_not_follow = fails_to_follow(
+    EUPG, "Variable λ EUPG fails to follow the preference.", "Abstract; table of learned strategies"
 )
-def eupg_does_not_follow(evidence):
-    carbon, thaw, answer = follows(evidence, "main", EUPG)
-    papers = paper_change(EUPG)
-    rows = [
-        Row("carbon return, weight 1 less weight 0", short(papers[0]), carbon),
-        Row("thaw return, weight 1 less weight 0", short(papers[1]), thaw),
-    ]
-    return finding(rows, opposite(answer))
 
 
 @claim(
