@@ -257,6 +257,7 @@ def variants(seeds) -> list[Job]:
         ("ppo_gated", {"reward_scales": REWARD_SCALES}),
         ("eupg_var_lambda", {"utility": "total", "num_envs": 8}),
         ("eupg_var_lambda", OTHERS),
+        ("eupg_var_lambda", {"masks": False}),  # the paper names no masks for its EUPG
     )
     return [trained("variants", script, seed, **change) for script, change in changes for seed in seeds_of(5, seeds)]
 

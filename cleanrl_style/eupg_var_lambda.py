@@ -48,6 +48,8 @@ class Args:
     """what is subtracted from a return: nothing, by the definition, or the mean of the batch's other episodes"""
     ent_coef: float = 0.0
     """coefficient of the entropy bonus, in units of return; 0 by the definition"""
+    masks: bool = True
+    """choose among valid actions (no: among all; what can be done of one is done, at the environment's penalties)"""
 
     # Evaluation and output
     eval_episodes: int = 200
@@ -85,8 +87,9 @@ def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
 class Agent(nn.Module):
     """A policy of the observation and, at its end, of the returns accrued so far."""
 
-    def __init__(self, envs, num_objectives=2):
+    def __init__(self, envs, num_objectives=2, masked=True):
         super().__init__()
+        self.masked = masked
         observation_dim = np.array(envs.single_observation_space.shape).prod()
         self.actor = nn.Sequential(
             layer_init(nn.Linear(observation_dim + num_objectives, 128)),
@@ -98,8 +101,11 @@ class Agent(nn.Module):
 
     def get_distribution(self, x, mask):
         """x (n, observation + m), mask (n, 25) bool, at least one action valid in each row."""
-        # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in the entropy
-        return Categorical(logits=torch.where(mask, self.actor(x), -1e8), validate_args=False)
+        logits = self.actor(x)
+        if self.masked:
+            # -1e8 makes the probability exactly 0, and unlike -inf has no NaN in the entropy
+            logits = torch.where(mask, logits, -1e8)
+        return Categorical(logits=logits, validate_args=False)
 
     def get_action(self, x, mask, action=None):
         distribution = self.get_distribution(x, mask)
@@ -188,7 +194,7 @@ if __name__ == "__main__":
         # env setup
         envs = run.make_envs()
 
-        agent = Agent(envs, task.num_objectives)
+        agent = Agent(envs, task.num_objectives, args.masks)
         optimizer = optim.Adam(agent.parameters(), lr=args.learning_rate, fused=True)
 
         # TRY NOT TO MODIFY: start the game
@@ -301,7 +307,7 @@ if __name__ == "__main__":
             run.save(global_step, last, **state)
 
         envs.close()
-        run.save_policy(agent, num_objectives=task.num_objectives)
+        run.save_policy(agent, num_objectives=task.num_objectives, masked=args.masks)
 
         evaluation_start = time.perf_counter()
         evaluation, years = protocol.evaluate(task, make_policy(agent), args.eval_weights, args.eval_episodes)

@@ -15,9 +15,9 @@ from cleanrl_style.eupg_var_lambda import Agent, compute_utilities, eupg_loss, p
 STEPS, SIZE = 6, 5
 
 
-def make_agent():
+def make_agent(masked=True):
     torch.manual_seed(0)
-    agent = Agent(SimpleNamespace(single_observation_space=gym.spaces.Box(0, 1, (SIZE,)))).double()
+    agent = Agent(SimpleNamespace(single_observation_space=gym.spaces.Box(0, 1, (SIZE,))), masked=masked).double()
     with torch.no_grad():
         agent.actor[-1].weight *= 100  # far from uniform
     return agent
@@ -51,8 +51,8 @@ def numpy_gradient(agent, x, masks, actions, utilities):
 
 
 @pytest.mark.parametrize("which", ["total", "future"])
-@pytest.mark.parametrize("gamma", [1.0, 0.9])
-def test_gradient_is_that_of_a_numpy_implementation(episode, which, gamma):
+@pytest.mark.parametrize(("gamma", "masked"), [(1.0, True), (0.9, True), (1.0, False)])
+def test_gradient_is_that_of_a_numpy_implementation(episode, which, gamma, masked):
     x, masks, actions, rewards, preference = episode
     scalarized = preference * rewards[:, 0] + (1 - preference) * rewards[:, 1]
     discounts = gamma ** np.arange(STEPS)
@@ -63,10 +63,12 @@ def test_gradient_is_that_of_a_numpy_implementation(episode, which, gamma):
     utilities = compute_utilities(rewards[:, None], np.array([[preference, 1 - preference]]), gamma, which)[:, 0]
     np.testing.assert_allclose(utilities, expected, rtol=1e-12)
 
-    agent = make_agent()
+    agent = make_agent(masked)
     loss, _ = eupg_loss(agent, torch.tensor(x), torch.tensor(masks), torch.tensor(actions), torch.tensor(utilities))
     loss.backward()
-    for parameter, gradient in zip(agent.parameters(), numpy_gradient(agent, x, masks, actions, expected), strict=True):
+    choice = masks if masked else np.ones_like(masks)
+    gradients = numpy_gradient(agent, x, choice, actions, expected)
+    for parameter, gradient in zip(agent.parameters(), gradients, strict=True):
         np.testing.assert_allclose(parameter.grad.numpy(), gradient, rtol=1e-9, atol=1e-12)
 
 

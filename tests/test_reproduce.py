@@ -24,7 +24,7 @@ COUNTS = {
     "site": 45,
     "thaw": 12,
     "controls": 20,
-    "variants": 30,
+    "variants": 35,
     "mechanisms": 2,
     "difficulty": 2,
     "budgets": 35,
