@@ -10,7 +10,7 @@ computed, and the same results give the same bytes.
 
 import sys
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis import experiments, paths
@@ -44,7 +44,7 @@ from analysis.paper_claims.claim import (
     Missing,
     Number,
 )
-from analysis.paper_claims.evidence import Evidence
+from analysis.paper_claims.evidence import EUPG, Evidence, WithoutMasks
 from analysis.results import Results
 from cleanrl_style import protocol
 
@@ -83,8 +83,9 @@ episodes. What is over sites or episodes is a mean with its 95 % t interval, a c
 Wilson's, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
 pairs of stands are compared the active layer stands beside it. The paper's boundary is the top of the permafrost table:
 claims on how much the site decides, on scatter between episodes and on warming fluxes hang on that depth, too. The
-paper trained a single agent for all sites; its ± is over episodes. All trained methods choose among valid actions here,
-EUPG too, for which the paper names no mask: what is said of EUPG is of one that pays no penalty for invalid actions.
+paper trained a single agent for all sites; its ± is over episodes. Trained methods choose among
+valid actions. The paper names masks for its PPOs alone, so claims on Variable λ EUPG are judged by one that chooses
+among all actions, too, and pays for what cannot be carried out; claims on Fixed λ EUPG are not.
 
 **Kinds and votes.** Claims of the paper are sorted by what they are about, and every fact has one vote: a claim that
 states another's fact once more names it and has none. A level, a return or a density of another simulator, is set
@@ -117,7 +118,28 @@ class Args:
 
 
 def judge(claim: Claim, evidence: Evidence) -> Finding:
-    """What the evidence says of a claim; a claim that lacks something has no rows."""
+    """What the evidence says of a claim, read in both ways if it is on EUPG; one that lacks something has no rows."""
+    evidence.asked_for_eupg = False
+    found = measure(claim, evidence)
+    if found.verdict == NO_RUNS or not evidence.asked_for_eupg:
+        return found
+    unmasked = WithoutMasks(evidence.results)
+    if not unmasked.results.rows[unmasked.job("main", EUPG).row]:
+        return replace(found, remark=f"{found.remark} EUPG without masks: {NO_RUNS}.".strip())
+    other = measure(claim, unmasked)
+    shown = {(row.what, str(row.ours)) for row in found.rows}
+    differing = (row for row in other.rows if (row.what, str(row.ours)) not in shown)
+    rows = [replace(row, what=f"{row.what}; EUPG without masks") for row in differing]
+    found = replace(found, rows=[*found.rows, *rows])
+    if found.verdict not in (HOLDS, FAILS, UNDECIDED):
+        return found
+    told = f"EUPG with masks: {found.verdict}; without: {other.verdict}."
+    verdict = found.verdict if other.verdict == found.verdict else UNDECIDED
+    return replace(found, verdict=verdict, remark=f"{found.remark} {told}".strip())
+
+
+def measure(claim: Claim, evidence: Evidence) -> Finding:
+    """What the evidence says of a claim in one reading; levels are compared, and never failed."""
     try:
         found = claim.measure(evidence)
     except Missing as lacking:

@@ -272,6 +272,29 @@ def test_five_seeds_are_enough(five_seeds):
     assert found(preference.curriculum_follows, five_seeds)[0].verdict == FAILS
 
 
+def test_claims_on_eupg_are_undecided_where_masks_decide(five_seeds):
+    """Gated's return is 4.7 in the mean; with masks EUPG's is far below it, without masks far above."""
+    for seed in range(1, 6):
+        write_run(five_seeds / f"e{seed}", "eupg_var_lambda", seed, (0.4,) * 3, (0.4,) * 3, vectorization="lockstep")
+    finding, ours = found(performance.gated_beats_eupg, five_seeds)
+    assert finding.verdict == HOLDS and finding.remark.endswith(f"EUPG without masks: {NO_RUNS}.")
+
+    evidence_of.cache_clear()
+    for seed in range(1, 6):
+        flags = {"vectorization": "lockstep", "masks": False}
+        write_run(five_seeds / f"u{seed}", "eupg_var_lambda", seed, (9.0 + seed,) * 3, (9.0,) * 3, **flags)
+    finding, ours = found(performance.gated_beats_eupg, five_seeds)
+    assert finding.verdict == UNDECIDED
+    assert finding.remark.endswith(f"EUPG with masks: {HOLDS}; without: {FAILS}.")
+    assert ours["scalarised, Gated less EUPG"].low > 0.0
+    assert ours["scalarised, Gated less EUPG; EUPG without masks"].high < 0.0
+    # a claim on others has one reading, and of a level no verdict is told
+    assert found(performance.curriculum_beats_gated, five_seeds)[0].verdict == HOLDS
+    finding, ours = found(performance.VALUES[performance.EUPG], five_seeds)
+    assert finding.verdict == COMPARED and not finding.remark
+    assert ours["scalarised return; EUPG without masks"].value > ours["scalarised return"].value + 5.0
+
+
 def test_no_difference_is_not_reproduced(tmp_path):
     for seed in range(1, 6):
         for script in ("ppo_curriculum", "ppo_gated"):

@@ -18,6 +18,7 @@ PAPER_ALONE = ""
 VARIANCE, FRONTS = "python analysis/studies/variance.py", "python analysis/studies/fronts.py"
 BENCHMARK, PROFILE = "python analysis/benchmark.py", "python analysis/profile_kernel.py"
 SAME_WEATHERS = "resampled sites, all under the same weathers"  # what the study of variance has intervals over
+EUPG = "eupg_var_lambda"
 PARTS = 10  # of a training; its first and its last are compared
 
 
@@ -73,14 +74,19 @@ def first_and_last(run, column: str, statistic: str = "mean") -> tuple[float, fl
     return parts[0], parts[-1]
 
 
+WITH_EUPG = only("main", "variants")  # EUPG is judged with masks and without: the paper names them for its PPOs alone
+
+
 class Evidence:
     """The results; metrics of a run are computed once."""
 
     def __init__(self, results: Results):
         self.results, self._known = results, {}
+        self.asked_for_eupg = False  # of the main table, which has it choose among valid actions
 
     def job(self, experiment: str, script: str, budget: float = 1.0, **flags) -> Job:
         """The first job of an experiment with these flags and this multiple of the main table's steps."""
+        self.asked_for_eupg |= (experiment, script) == ("main", EUPG)
         jobs = [
             job
             for job in self.results.jobs
@@ -149,6 +155,16 @@ class Evidence:
         if not path.exists():
             raise Missing(name)
         return read(path)
+
+
+class WithoutMasks(Evidence):
+    """The same, but that the main table's EUPG chooses among all actions."""
+
+    def job(self, experiment: str, script: str, budget: float = 1.0, **flags) -> Job:
+        """As Evidence.job; that of EUPG without masks for the main table's EUPG."""
+        if (experiment, script) == ("main", EUPG):
+            experiment, flags = "variants", {**flags, "masks": False}
+        return super().job(experiment, script, budget, **flags)
 
 
 def main_metrics(one: Replicate) -> dict:

@@ -23,9 +23,18 @@ from analysis.paper_claims.claim import (
     opposite,
     short,
 )
-from analysis.paper_claims.evidence import difference, main_metrics, only, optional, seeds, unpaired
+from analysis.paper_claims.evidence import (
+    EUPG,
+    WITH_EUPG,
+    difference,
+    main_metrics,
+    only,
+    optional,
+    seeds,
+    unpaired,
+)
 from analysis.paper_claims.mechanisms import gains_of
-from analysis.paper_claims.performance import CURRICULUM, EUPG, GATED
+from analysis.paper_claims.performance import CURRICULUM, GATED
 from analysis.tables.common import paper
 from analysis.tables.lambda_violations import violations
 from cleanrl_style.protocol import reference, sites
@@ -108,7 +117,7 @@ def apart_rows(evidence) -> list[Row]:
 def fails_to_follow(script: str, statement: str, where: str):
     """The claim that a method does not follow the preference."""
 
-    @claim(statement, where, MAIN)
+    @claim(statement, where, WITH_EUPG if script == EUPG else MAIN)
     def does_not_follow(evidence):
         rows, answer = changes(evidence, script)
         return finding(rows, opposite(answer))
@@ -202,7 +211,7 @@ def violation(evidence, script: str, name: str = "violations_percent") -> pd.Ser
 @claim(
     "Curriculum PPO violates λ-monotonicity least (50 %).",
     "Appendix, λ-monotonicity",
-    only("main", "fixed"),
+    only("main", "variants", "fixed"),
     note="The paper counts a return that fails to increase, ties included, and so does the verdict; without ties, "
     "one that moves the wrong way counts. In random order: the same points, shuffled. Beyond their interval: "
     "only changes larger than their paired interval over episodes count.",
