@@ -83,9 +83,9 @@ episodes. What is over sites or episodes is a mean with its 95 % t interval, a c
 Wilson's, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
 pairs of stands are compared the active layer stands beside it. The paper's boundary is the top of the permafrost table:
 claims on how much the site decides, on scatter between episodes and on warming fluxes hang on that depth, too. The
-paper trained a single agent for all sites; its ± is over episodes. Trained methods choose among
-valid actions. The paper names masks for its PPOs alone, so claims on Variable λ EUPG are judged by one that chooses
-among all actions, too, and pays for what cannot be carried out; claims on Fixed λ EUPG are not.
+paper trained a single agent for all sites; its ± is over episodes. Trained methods choose among valid actions. The
+paper names masks for its PPOs alone, so claims on Variable λ EUPG are judged, too, by one that chooses among all
+actions and pays for what cannot be carried out; those on Fixed λ EUPG are not.
 
 **Kinds and votes.** Claims of the paper are sorted by what they are about, and every fact has one vote: a claim that
 states another's fact once more names it and has none. A level, a return or a density of another simulator, is set
@@ -124,7 +124,9 @@ def judge(claim: Claim, evidence: Evidence) -> Finding:
     if found.verdict == NO_RUNS or not evidence.asked_for_eupg:
         return found
     unmasked = WithoutMasks(evidence.results)
-    if not unmasked.results.rows[unmasked.job("main", EUPG).row]:
+    try:
+        unmasked.replicates("main", EUPG)
+    except Missing:
         return replace(found, remark=f"{found.remark} EUPG without masks: {NO_RUNS}.".strip())
     other = measure(claim, unmasked)
     shown = {(row.what, str(row.ours)) for row in found.rows}

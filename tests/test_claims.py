@@ -518,7 +518,7 @@ def write_fronts_and_variance(folder, generator):
     columns += [f"{name}_end_{what}" for name in objectives for what in ends]
     summary = pd.DataFrame(generator.uniform(size=(12, len(columns))), columns=columns)
     stored.write(folder / "fronts" / "summary.csv", summary, {})
-    parts = ("site", "weather", "policy", "site x weather", "site x policy", "weather x policy")
+    parts = ("site", "weather", "policy", "site x policy", "weather x policy")
     shares = pd.DataFrame(
         [(value, name, part) for value in ("return", "one year") for name in objectives for part in parts],
         columns=["value", "objective", "component"],

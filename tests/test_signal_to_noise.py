@@ -81,6 +81,13 @@ def tiny():
     return states, signal_to_noise.play(TINY, 4, states, lambda number: None)
 
 
+def test_no_two_weathers_are_the_same():
+    sites, pasts, futures = (range(number) for number in TINY[:3])
+    seeds = [TINY.past_seeds(site, past) for site in sites for past in pasts]
+    seeds += [TINY.future_seeds(site, past, future) for site in sites for past in pasts for future in futures]
+    assert len({one.weather for one in seeds}) == len(seeds) == 2 * 2 * 3
+
+
 def test_equal_actions_have_no_effect(monkeypatch):
     monkeypatch.setattr(signal_to_noise, "ACTIONS", {"first": 12, "second": 12})
     rewards = signal_to_noise.play(TINY, 4, signal_to_noise.pasts(TINY), lambda number: None)
@@ -92,7 +99,7 @@ def test_a_pair_is_an_episode_of_the_environment(tiny):
     """An action in the first year of plans, on the weather that follows, as `open_loop.play` has it."""
     rewards = tiny[1][0]
     site, planting = TINY.seeds()[1], signal_to_noise.REFERENCES.index(signal_to_noise.PLANTING)
-    seeds = [open_loop.seeds(site, TINY.future(1, 0))] * 2
+    seeds = [TINY.future_seeds(1, 1, 0)] * 2
     plans = [[24, 22, 22, 22], [12, 22, 22, 22]]
     played = open_loop.play([sim.sample_site(site)] * 2, seeds, plans).rewards
     np.testing.assert_allclose(rewards[planting, 1, 1, 0, [1, 0]], played)

@@ -11,31 +11,25 @@ SITE = open_loop.FIRST_SITE_SEED + 2
 
 
 def test_additive_table_has_no_interactions():
-    site, weather, policy = np.array([1.0, 4, 7, 20]), np.array([0.0, 2, 1]), np.array([-3.0, 3])
-    values = site[:, None, None] + weather[:, None] + policy
-    components = variance.variance_components(values)
-    for name, effect in (("site", site), ("weather", weather), ("policy", policy)):
-        assert components[name] == pytest.approx(effect.var(ddof=1))
-    assert components[[name for name in components.index if " x " in name]].abs().max() < 1e-12
+    site, weather, policy = np.array([1.0, 4, 7, 20]), np.array([[0.0, 2], [1, 3], [5, 3], [4, 6]]), np.array([-3.0, 3])
+    weather = weather - weather.mean(axis=1, keepdims=True)
+    components = variance.variance_components(site[:, None, None] + weather[:, :, None] + policy)
+    within = weather.var(axis=1, ddof=1).mean()
+    assert components["site"] == pytest.approx(site.var(ddof=1) - within / 2)  # a site's mean has half of its weathers'
+    assert components["weather"] == pytest.approx(within) and components["policy"] == pytest.approx(18)
+    assert components[["site x policy", "weather x policy"]].abs().max() < 1e-12
 
 
 def test_components_of_a_synthetic_table():
-    true = {
-        "site": 9.0,
-        "weather": 1.0,
-        "policy": 4.0,
-        "site x weather": 0.5,
-        "site x policy": 2.0,
-        "weather x policy": 0.25,
-        "site x weather x policy": 1.0,
-    }
-    sizes = dict(zip(variance.FACTORS, (12, 10, 11), strict=True))
+    true = {"site": 9.0, "weather": 1.5, "policy": 4.0, "site x policy": 2.0, "weather x policy": 1.0}
+    sizes = (12, 10, 11)
+    of = {"site": (0,), "weather": (0, 1), "policy": (2,), "site x policy": (0, 2), "weather x policy": (0, 1, 2)}
     generator = np.random.default_rng(0)
     estimates = []
     for _ in range(400):
-        values = np.zeros(tuple(sizes.values()))
+        values = np.zeros(sizes)
         for name, component in true.items():
-            shape = [size if factor in name.split(" x ") else 1 for factor, size in sizes.items()]
+            shape = [size if axis in of[name] else 1 for axis, size in enumerate(sizes)]
             values = values + component**0.5 * generator.standard_normal(shape)
         estimates.append(variance.variance_components(values))
     estimates = pd.DataFrame(estimates)
@@ -43,20 +37,30 @@ def test_components_of_a_synthetic_table():
     assert error.abs().max() < 4
 
 
+def test_one_weather_a_site():
+    """Two factors without repeats: the site's, the policy's, and what is left."""
+    values = np.array([[[0.0, 2.0, 7.0]], [[1.0, 5.0, 3.0]]])
+    components = variance.variance_components(values)
+    # sums of squares 0, 21 and 13 with 1, 2 and 2 degrees of freedom
+    expected = {"site": -6.5 / 3, "weather": 0, "policy": 2, "site x policy": 6.5, "weather x policy": 0}
+    assert components.to_dict() == pytest.approx(expected)
+
+
 def test_a_small_component_may_be_estimated_below_zero():
     # the sites' means are equal, which weathers alone would make unlikely
-    components = variance.variance_components(np.array([[1.0, -1.0], [-1.0, 1.0]]), ("site", "weather"))
-    assert components["site"] == pytest.approx(-2) and components["site x weather"] == pytest.approx(4)
+    values = np.array([[1.0, -1.0], [-1.0, 1.0]])[:, :, None] + np.zeros(2)
+    components = variance.variance_components(values)
+    assert components["site"] == pytest.approx(-1) and components["weather"] == pytest.approx(2)
 
 
 def test_objectives_are_compared_by_what_their_returns_vary_with():
     generator = np.random.default_rng(2)
-    sites, weathers, policies = (generator.standard_normal(n) for n in (400, 30, 30))
-    parts = 3 * sites[:, None, None] + weathers[:, None] + policies
+    sites, weathers, policies = (generator.standard_normal(n) for n in (400, (400, 30), 30))
+    parts = 3 * sites[:, None, None] + weathers[:, :, None] + policies
     one = variance.compared(np.stack([parts, 2 * parts], axis=-1))
     assert one["standard deviation, carbon"] == pytest.approx(np.sqrt(9 * sites.var() + 1 + 1), rel=0.2)
     assert one["thaw over carbon"] == pytest.approx(2) and one["thaw over carbon, decided"] == pytest.approx(2)
-    both = weathers.var(ddof=1) + policies.var(ddof=1)
+    both = weathers.var(axis=1, ddof=1).mean() + policies.var(ddof=1)
     assert one["decided on a site, carbon"] == pytest.approx(policies.var(ddof=1) / both)
     table = variance.with_intervals(np.stack([parts, 2 * parts], axis=-1)[:40]).set_index("quantity")
     assert table.loc["thaw over carbon"].tolist() == pytest.approx([2, 2, 2])
@@ -87,7 +91,7 @@ def test_a_tiny_design(tmp_path, monkeypatch):
     assert (unchanged[["carbon_gain", "thaw_gain"]] == 0).all(axis=None)
     # a row in the middle carries the right labels
     row = episodes[(episodes.site == SITE) & (episodes.weather == 1) & (episodes.policy == "-50 half")].iloc[0]
-    played = open_loop.play([sim.sample_site(SITE)], [open_loop.seeds(SITE, 1)], [[7, 7]]).returns()[0]
+    played = open_loop.play([sim.sample_site(SITE)], [open_loop.seeds(SITE, 2 * 2 + 1)], [[7, 7]]).returns()[0]
     assert row[["carbon_return", "thaw_return"]].tolist() == pytest.approx(played, rel=1e-8)
 
 

@@ -9,26 +9,24 @@ from analysis.studies.signal_to_noise import CONTRASTS, UNIFORM, WEIGHTINGS
 from analysis.tables.learning_difficulty import YEAR, variance_components
 
 SIZE = (7, 5.8)
+COURSE, COURSE_YEAR = "conifers, not deciduous", "0"  # both of its effects can be told from none
 MADE_BY = "python analysis/studies/variance.py && python analysis/reproduce.py --only difficulty"
 CAPTION = (
-    f"(b)-(d) one action in year {YEAR} under uniformly random valid actions, the same sites and weathers with "
-    "either action; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside; an interval to the left edge "
-    "reaches 0. (c) means alone; carbon's step after 33 years is one year's, whose interval holds 0. (d) half of the "
-    "episodes have either action; dashed line: those of a training run; an interval to "
-    "the right edge has no end; diamonds: of the effect as a generalised advantage (GAE) sees it, which may have "
-    "the other sign. (b, d) Green: carbon, blue: thaw."
+    f"(b)-(d) one action in year {YEAR}, (c) {COURSE_YEAR}, under uniformly random valid actions, the same sites and "
+    "weathers with either; intervals: 95 %, bootstrap over sites. (b) sizes, signs aside; an interval to the left edge "
+    "reaches 0. (c) means alone. (d) half of the episodes have either action; dashed line: those of a training run; an "
+    "interval to the right edge has no end; diamonds: of the effect as a generalised advantage (GAE) sees it, which "
+    "may have the other sign. (b, d) Green: carbon, blue: thaw."
 )
 COMPONENTS = {
     "site": "#0072B2",
     "weather": "#56B4E9",
-    "site x weather": "#999999",
     "policy": "#D55E00",
     "site x policy": "#E69F00",
 }
 REST = "#DDDDDD"
 OF = {"carbon": ("#009E73", "o"), "thaw": ("#0072B2", "s")}
 TRAINING_EPISODES = 6000
-COURSE = "conifers, not deciduous"  # both of its effects can be told from none
 
 
 def draw(figure, results) -> None:
@@ -52,7 +50,7 @@ def draw(figure, results) -> None:
         return
     cases = table[(table.reference == UNIFORM) & (table.year == YEAR)].set_index(["weighting", "contrast", "objective"])
     draw_noise(noise, cases.loc["return"])
-    draw_course(course, years[(years.reference == UNIFORM) & (years.year == YEAR)])
+    draw_course(course, years[(years.reference == UNIFORM) & (years.year == COURSE_YEAR)])
     draw_needed(needed, cases)
 
 

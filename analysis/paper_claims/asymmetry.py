@@ -24,7 +24,7 @@ from analysis.paper_claims.claim import (
     within,
 )
 from analysis.paper_claims.evidence import (
-    SAME_WEATHERS,
+    SITES_OF_VARIANCE,
     VARIANCE,
     difference,
     first_and_last,
@@ -328,7 +328,7 @@ def share(evidence, objective: str, component: str) -> Number:
     """Share of a component in the variance of 50-year returns, with its interval over resampled sites."""
     table = evidence.beside("variance/components.csv")
     row = table[(table.value == "return") & (table.objective == objective)].set_index("component").loc[component]
-    return Number(row.share, row.share_low, row.share_high, SAME_WEATHERS)
+    return Number(row.share, row.share_low, row.share_high, SITES_OF_VARIANCE)
 
 
 @claim(

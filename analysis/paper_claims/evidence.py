@@ -17,7 +17,7 @@ from analysis.tables.main_results import run_metrics
 PAPER_ALONE = ""
 VARIANCE, FRONTS = "python analysis/studies/variance.py", "python analysis/studies/fronts.py"
 BENCHMARK, PROFILE = "python analysis/benchmark.py", "python analysis/profile_kernel.py"
-SAME_WEATHERS = "resampled sites, all under the same weathers"  # what the study of variance has intervals over
+SITES_OF_VARIANCE = "resampled sites"  # what the study of variance has intervals over
 EUPG = "eupg_var_lambda"
 PARTS = 10  # of a training; its first and its last are compared
 
@@ -147,7 +147,7 @@ class Evidence:
     def compared(self, quantity: str) -> Number:
         """How the objectives' returns compare, by the study of variance, with its interval over resampled sites."""
         row = self.beside("variance/compared.csv").set_index("quantity").loc[quantity]
-        return Number(row.value, row.low, row.high, SAME_WEATHERS)
+        return Number(row.value, row.low, row.high, SITES_OF_VARIANCE)
 
     def beside(self, name: str, read: Callable[[Path], pd.DataFrame] = stored.read) -> pd.DataFrame:
         """A table beside the studies' folder."""

@@ -59,7 +59,7 @@ PERIODS = {"years_0_5": slice(0, 5), "years_5_20": slice(5, 20), "years_20_50": 
 
 
 class Design(NamedTuple):
-    """Sampled sites; on each, weathers before the action, and after each of them several that may follow."""
+    """Sampled sites; on each, weathers of its own before the action, and after each several that may follow."""
 
     sites: int
     pasts: int
@@ -70,9 +70,14 @@ class Design(NamedTuple):
         """Seeds of the sites."""
         return [open_loop.FIRST_SITE_SEED + k for k in range(self.sites)]
 
-    def future(self, past: int, future: int) -> int:
-        """Number of the weather that follows: no past's."""
-        return self.pasts + past * self.futures + future
+    def past_seeds(self, site: int, past: int) -> sim.Seeds:
+        """Seeds of what comes before the action on a site, counted from 0."""
+        return open_loop.seeds(self.seeds()[site], site * self.pasts * (1 + self.futures) + past)
+
+    def future_seeds(self, site: int, past: int, future: int) -> sim.Seeds:
+        """Seeds of what follows: no past's, and no other site's."""
+        before = site * self.pasts * (1 + self.futures) + self.pasts
+        return open_loop.seeds(self.seeds()[site], before + past * self.futures + future)
 
 
 FULL = Design(sites=24, pasts=2, futures=3, years=(0, 5, 15, 30))
@@ -130,14 +135,14 @@ def branch(state: dict, rows, seeds, **arguments) -> sim.Stands:
 
 def pasts(design: Design) -> dict[int, dict]:
     """States of the stands at the beginning of each of the design's years; rows: reference, site, past."""
-    cases = list(product(REFERENCES, design.seeds(), range(design.pasts)))
+    cases = list(product(REFERENCES, range(design.sites), range(design.pasts)))
     stands = sim.Stands(len(cases))
-    seeds = [open_loop.seeds(site, past) for _, site, past in cases]
-    stands.start(np.arange(len(cases)), [sim.sample_site(site) for _, site, _ in cases], seeds)
+    seeds = [design.past_seeds(site, past) for _, site, past in cases]
+    stands.start(np.arange(len(cases)), [sim.sample_site(design.seeds()[site]) for _, site, _ in cases], seeds)
     states, now = {}, 0
     for year in design.years:
         if year > now:
-            orders = [order(reference, [site, past], year)[now:] for reference, site, past in cases]
+            orders = [order(reference, [design.seeds()[site], past], year)[now:] for reference, site, past in cases]
             advance(stands, np.array(orders))
         states[year], now = stands.get_state(), year
     return states
@@ -160,10 +165,10 @@ def play(design: Design, years: int, states: dict[int, dict], played) -> dict[in
         for chunk in chunks(np.argwhere(valid)):
             rows = np.ravel_multi_index(chunk[:, :3].T, shape)
             seeds, orders = [], []
-            for reference, k, past, future, action in chunk:
-                site = design.seeds()[k]
-                seeds.append(open_loop.seeds(site, design.future(past, future)))
-                orders.append(order(REFERENCES[reference], [site, past, future, 1], left))
+            for reference, site, past, future, action in chunk:
+                seeds.append(design.future_seeds(site, past, future))
+                dice = [design.seeds()[site], past, future, 1]
+                orders.append(order(REFERENCES[reference], dice, left))
                 orders[-1][0, 0] = list(ACTIONS.values())[action]
             rewards[year][tuple(chunk.T)] = advance(branch(state, rows, seeds), np.array(orders))
             played(len(chunk) * left)
@@ -175,11 +180,7 @@ def play_every_year(design: Design, years: int, state: dict, played) -> np.ndarr
     cases = np.array(list(np.ndindex(design.sites, design.pasts, design.futures, len(ACTIONS))))
     rewards = []
     for chunk in chunks(cases):
-        sites = [design.seeds()[k] for k in chunk[:, 0]]
-        seeds = [
-            open_loop.seeds(site, design.future(past, future))
-            for site, (_, past, future, _) in zip(sites, chunk, strict=True)
-        ]
+        seeds = [design.future_seeds(site, past, future) for site, past, future, _ in chunk]
         orders = [fixed(list(ACTIONS.values())[action], years) for action in chunk[:, 3]]
         # the first reference's first past is row 0 of each site: in year 0 they do not differ
         rewards.append(advance(branch(state, chunk[:, 0] * design.pasts, seeds), np.array(orders)))

@@ -2,15 +2,14 @@
 
     python analysis/studies/variance.py
 
-Every site is played under every weather and every policy (a balanced, crossed design), so the analysis of variance has
-all interactions, and what is left for the last, site x weather x policy, is no error: the simulator has none. Sites
-are sampled as the environment samples them, each with its own start. The shares are those of this set of policies:
-wilder ones would have a larger share.
+Every site has weathers of its own and is played under each with every policy (a balanced design, weathers nested in
+sites). What is left for the last component, weather x policy, is no error: the simulator has none. Sites are sampled
+as the environment samples them, each with its own start. The shares are those of this set of policies: wilder ones
+would have a larger share.
 """
 
 import sys
 from dataclasses import asdict, dataclass
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +46,7 @@ class Args:
     sites: int = 48
     """sampled sites"""
     weathers: int = 8
-    """weathers, the same dice on every site"""
+    """weathers of each"""
     quick: bool = False
     """4 sites and 2 weathers, only to show that everything works"""
     output_dir: Path | None = None
@@ -63,7 +62,12 @@ def plans(years: int) -> np.ndarray:
 def play(site_seeds: list[int], weathers: int) -> np.ndarray:
     """Rewards of the whole design, (sites, weathers, policies, years, 2)."""
     each = plans(YEARS)
-    design = [(site, weather, policy) for site in site_seeds for weather in range(weathers) for policy in each]
+    design = [
+        (site, k * weathers + weather, policy)
+        for k, site in enumerate(site_seeds)
+        for weather in range(weathers)
+        for policy in each
+    ]
     progress = protocol.Progress("variance", len(design), "episodes")
     rewards = []
     for first in range(0, len(design), CHUNK):
@@ -74,32 +78,37 @@ def play(site_seeds: list[int], weathers: int) -> np.ndarray:
     return np.concatenate(rewards).reshape(len(site_seeds), weathers, len(each), YEARS, 2)
 
 
-def variance_components(values: np.ndarray, factors: tuple[str, ...] = FACTORS) -> pd.Series:
-    """Variance components of a balanced crossed design, a value a cell, by the expected mean squares.
+def variance_components(values: np.ndarray) -> pd.Series:
+    """Variance components of values (sites, weathers, policies), where every site has weathers of its own.
 
-    values : one axis a factor, two levels or more each. Index: factors and their interactions ("site x weather"). All
-    factors are random; the components estimate the variances that add up to that of a value drawn at random. The
-    estimates are unbiased, hence may be negative where the true component is near zero; they are left so.
+    Site, weather and policy are drawn at random; "weather" is that within a site. The components estimate variances
+    that add up to that of a value drawn at random, by the expected mean squares. They are unbiased, hence may be
+    negative where the true component is near zero; they are left so. With one weather a site what it adds is part of
+    the others.
     """
-    terms = [term for size in range(values.ndim + 1) for term in combinations(range(values.ndim), size)]
-    effects, squares = {}, {}
-    for term in terms:
-        others = tuple(axis for axis in range(values.ndim) if axis not in term)
-        mean = values.mean(axis=others, keepdims=True)
-        effects[term] = mean - sum((effects[part] for part in terms if set(part) < set(term)), np.zeros(()))
-        freedom = np.prod([values.shape[axis] - 1 for axis in term])
-        repeats = np.prod([values.shape[axis] for axis in others])
-        squares[term] = (effects[term] ** 2).sum() * repeats / freedom
-    components = {}
-    for term in reversed(terms[1:]):
-        repeats = np.prod([values.shape[axis] for axis in range(values.ndim) if axis not in term])
-        larger = {
-            t: np.prod([values.shape[axis] for axis in range(values.ndim) if axis not in t])
-            for t in components
-            if set(term) < set(t)
+    sites, weathers, policies = values.shape
+    freedom = max(weathers - 1, 1)
+    mean, of_site, of_policy = (values.mean(axis=axes, keepdims=True) for axes in ((0, 1, 2), (1, 2), (0, 1)))
+    of_weather, of_both = (values.mean(axis=axis, keepdims=True) for axis in (2, 1))
+    site, weather, policy, both, rest = (
+        (deviations**2).sum() * values.size / deviations.size / degrees
+        for deviations, degrees in (
+            (of_site - mean, sites - 1),
+            (of_weather - of_site, sites * freedom),
+            (of_policy - mean, policies - 1),
+            (of_both - of_site - of_policy + mean, (sites - 1) * (policies - 1)),
+            (values - of_weather - of_both + of_site, sites * freedom * (policies - 1)),
+        )
+    )
+    return pd.Series(
+        {
+            "site": (site - weather - both + rest) / (weathers * policies),
+            "weather": (weather - rest) / policies,
+            "policy": (policy - both) / (sites * weathers),
+            "site x policy": (both - rest) / weathers,
+            "weather x policy": rest,
         }
-        components[term] = (squares[term] - sum(n * components[t] for t, n in larger.items())) / repeats
-    return pd.Series({" x ".join(factors[axis] for axis in term): components[term] for term in terms[1:]})
+    )
 
 
 def shares(components: pd.Series) -> pd.Series:

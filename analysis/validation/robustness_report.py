@@ -84,7 +84,7 @@ def _variance(name: str, episodes: open_loop.Episodes) -> tuple[list[str], float
     """A row: spread, shares and the plans' effects; and the share of sites whose boundary takes nearly no heat in the
     first years of zero change."""
     returns = _thaw_returns(episodes, PLANS)
-    shares = variance.shares(variance.variance_components(returns, ("site", "policy")))
+    shares = variance.shares(variance.variance_components(returns[:, None]))
     heat = boundary_heat(episodes.record[:: len(PLANS), :BALANCE_YEARS])
     row = [
         name,
