@@ -1,10 +1,12 @@
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from tiny_runs import TINY_RUNS, write_run, write_run_of_three
 
-from analysis import experiments, make_figures, make_tables, methods
+from analysis import experiments, make_figures, make_tables, methods, stored
 from analysis.figures import (
     algorithm_comparison,
     common,
@@ -15,6 +17,8 @@ from analysis.figures import (
 )
 from analysis.figures.common import no_data
 from analysis.results import Results
+
+ROOT = Path(__file__).parents[1]
 
 PANELS = {
     "learning_curves": 6,
@@ -161,6 +165,14 @@ def test_sites_differ_more_than_methods():
     assert words(ax) == "sd between sites: 14.1 sd between methods on a site: 1.4"
     assert ax.lines[0].get_ydata().tolist() == [1.0, -19.0]
     assert [segment[:, 1].tolist() for segment in ax.collections[0].get_segments()] == [[0.0, 2.0], [-20.0, -18.0]]
+
+
+def test_an_effect_whose_course_is_drawn_is_told_from_none():
+    table = stored.read(ROOT / "results/studies/signal_to_noise.csv", text=("year",))
+    drawn = {"contrast": learning_difficulty.COURSE, "year": learning_difficulty.COURSE_YEAR, "reference": "uniform"}
+    case = table[(table[list(drawn)] == list(drawn.values())).all(axis=1) & (table.weighting == "return")]
+    ends = case.set_index("objective").loc[["carbon", "thaw"], ["effect_low", "effect_high"]]
+    assert (ends.prod(axis=1) > 0).all()
 
 
 def test_marks_lie_within_their_axis():
