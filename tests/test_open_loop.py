@@ -46,6 +46,13 @@ def test_a_site_keeps_its_start_and_a_weather_its_dice():
     assert first.weather != second.weather
 
 
+def test_no_two_sites_share_a_weather_of_their_own():
+    sites = [open_loop.FIRST_SITE_SEED + k for k in range(3)]
+    own = [open_loop.own_seeds(site, weather, 4) for site in sites for weather in range(4)]
+    assert len({one.weather for one in own}) == len({one.disturbance for one in own}) == 12
+    assert [one.start for one in own] == [open_loop.seeds(site, 0).start for site in sites for _ in range(4)]
+
+
 def test_sites_span_the_ranges():
     def features(seeds):
         return np.array([list(open_loop.site_features(sim.sample_site(seed)).values()) for seed in seeds])

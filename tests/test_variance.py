@@ -91,7 +91,7 @@ def test_a_tiny_design(tmp_path, monkeypatch):
     assert (unchanged[["carbon_gain", "thaw_gain"]] == 0).all(axis=None)
     # a row in the middle carries the right labels
     row = episodes[(episodes.site == SITE) & (episodes.weather == 1) & (episodes.policy == "-50 half")].iloc[0]
-    played = open_loop.play([sim.sample_site(SITE)], [open_loop.seeds(SITE, 2 * 2 + 1)], [[7, 7]]).returns()[0]
+    played = open_loop.play([sim.sample_site(SITE)], [open_loop.own_seeds(SITE, 1, 2)], [[7, 7]]).returns()[0]
     assert row[["carbon_return", "thaw_return"]].tolist() == pytest.approx(played, rel=1e-8)
 
 

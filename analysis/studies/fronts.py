@@ -3,10 +3,10 @@
     python analysis/studies/fronts.py                        # 12 sites that span the ranges
     python analysis/studies/fronts.py --without-mechanisms   # 3 typical ones, each mechanism of the physics off in turn
 
-A plan is an action for every block of five years. It is sought on four weathers and reported on sixteen others, as
-returns and as gains: the return less that of zero change on the same weather. A front's ends, the plans with the
-highest mean of either return, are chosen on half of the sixteen; their gains and distance are those of the other half.
-Needs `pip install -e ".[planners]"`.
+A plan is an action for every block of five years. It is sought on four weathers of the site and reported on sixteen
+others, as returns and as gains: the return less that of zero change on the same weather. A front's ends, the plans with
+the highest mean of either return, are chosen on half of the sixteen; their gains and distance are those of the other
+half. Needs `pip install -e ".[planners]"`.
 A site is one table in results/fronts; a command that was stopped goes on with the next.
 """
 
@@ -74,10 +74,11 @@ def study(site_seed: int, budget: Budget, seed: int, years: int, mechanisms=None
 
     site = sim.sample_site(site_seed)
     blocks = -(-years // BLOCK_YEARS)
+    each = budget.weathers + budget.report_weathers
 
     def play(genes, weathers):
         plans = plan_genes.plans(genes, BLOCK_YEARS, years).repeat(len(weathers), axis=0)
-        seeds = [open_loop.seeds(site_seed, weather) for weather in weathers] * len(genes)
+        seeds = [open_loop.own_seeds(site_seed, weather, each) for weather in weathers] * len(genes)
         episodes = open_loop.play([site] * len(plans), seeds, plans, mechanisms=mechanisms)
         if played:
             played(len(plans))
@@ -216,6 +217,7 @@ def main(args: Args) -> None:
         "years": YEARS,
         "block_years": BLOCK_YEARS,
         "columns": RETURNS + STAND,
+        "weathers": "each site's own",
         "physics": reference.physics_name(),
     }
     paths.make_writable("--output-dir", folder)

@@ -97,6 +97,14 @@ def seeds(site_seed: int, weather: int) -> sim.Seeds:
     return dice._replace(start=sim.episode_seeds(site_seed).start)
 
 
+def own_seeds(site_seed: int, weather: int, each: int) -> sim.Seeds:
+    """The same for weather number `weather` of the `each` that every site has for itself.
+
+    Sites that share weathers share their fires: a mean over them then varies by more than its sites tell.
+    """
+    return seeds(site_seed, (site_seed - FIRST_SITE_SEED) * each + weather)
+
+
 def with_gains(plans: pd.DataFrame) -> pd.DataFrame:
     """A site's plans with GAINS: RETURNS less those of zero change on the same weather.
 

@@ -72,12 +72,12 @@ class Design(NamedTuple):
 
     def past_seeds(self, site: int, past: int) -> sim.Seeds:
         """Seeds of what comes before the action on a site, counted from 0."""
-        return open_loop.seeds(self.seeds()[site], site * self.pasts * (1 + self.futures) + past)
+        return open_loop.own_seeds(self.seeds()[site], past, self.pasts * (1 + self.futures))
 
     def future_seeds(self, site: int, past: int, future: int) -> sim.Seeds:
         """Seeds of what follows: no past's, and no other site's."""
-        before = site * self.pasts * (1 + self.futures) + self.pasts
-        return open_loop.seeds(self.seeds()[site], before + past * self.futures + future)
+        weather = self.pasts + past * self.futures + future
+        return open_loop.own_seeds(self.seeds()[site], weather, self.pasts * (1 + self.futures))
 
 
 FULL = Design(sites=24, pasts=2, futures=3, years=(0, 5, 15, 30))

@@ -62,17 +62,12 @@ def plans(years: int) -> np.ndarray:
 def play(site_seeds: list[int], weathers: int) -> np.ndarray:
     """Rewards of the whole design, (sites, weathers, policies, years, 2)."""
     each = plans(YEARS)
-    design = [
-        (site, k * weathers + weather, policy)
-        for k, site in enumerate(site_seeds)
-        for weather in range(weathers)
-        for policy in each
-    ]
+    design = [(site, weather, policy) for site in site_seeds for weather in range(weathers) for policy in each]
     progress = protocol.Progress("variance", len(design), "episodes")
     rewards = []
     for first in range(0, len(design), CHUNK):
         sites, dice, actions = zip(*design[first : first + CHUNK], strict=True)
-        seeds = [open_loop.seeds(site, weather) for site, weather in zip(sites, dice, strict=True)]
+        seeds = [open_loop.own_seeds(site, weather, weathers) for site, weather in zip(sites, dice, strict=True)]
         rewards.append(open_loop.play([sim.sample_site(site) for site in sites], seeds, actions).rewards)
         progress.show(first + len(sites))
     return np.concatenate(rewards).reshape(len(site_seeds), weathers, len(each), YEARS, 2)
