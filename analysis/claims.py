@@ -13,6 +13,8 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from analysis import experiments, paths
 from analysis.paper_claims import (
     asymmetry,
@@ -44,7 +46,7 @@ from analysis.paper_claims.claim import (
     Missing,
     Number,
 )
-from analysis.paper_claims.evidence import EUPG, Evidence, WithoutMasks
+from analysis.paper_claims.evidence import Evidence, WithoutMasks
 from analysis.results import Results
 from cleanrl_style import protocol
 
@@ -83,9 +85,10 @@ episodes. What is over sites or episodes is a mean with its 95 % t interval, a c
 Wilson's, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
 pairs of stands are compared the active layer stands beside it. The paper's boundary is the top of the permafrost table:
 claims on how much the site decides, on scatter between episodes and on warming fluxes hang on that depth, too. The
-paper trained a single agent for all sites; its ± is over episodes. Trained methods choose among valid actions. The
-paper names masks for its PPOs alone, so claims on Variable λ EUPG are judged, too, by one that chooses among all
-actions and pays for what cannot be carried out; those on Fixed λ EUPG are not.
+paper trained a single agent for all sites; its ± is over episodes. Trained methods in our tables choose among valid
+actions. The paper names masks for its PPOs alone, so claims on Variable λ EUPG are judged, too, by one that chooses
+among all actions and pays for what cannot be carried out, where that has been run (its rows stand where they differ);
+those on Fixed λ EUPG are not.
 
 **Kinds and votes.** Claims of the paper are sorted by what they are about, and every fact has one vote: a claim that
 states another's fact once more names it and has none. A level, a return or a density of another simulator, is set
@@ -118,26 +121,37 @@ class Args:
 
 
 def judge(claim: Claim, evidence: Evidence) -> Finding:
-    """What the evidence says of a claim, read in both ways if it is on EUPG; one that lacks something has no rows."""
+    """What the evidence says of a claim, read twice if it is on Variable λ EUPG; one that lacks something has no rows.
+
+    The second reading has EUPG without masks. It counts where it has runs enough for a verdict.
+    """
     evidence.asked_for_eupg = False
     found = measure(claim, evidence)
     if found.verdict == NO_RUNS or not evidence.asked_for_eupg:
         return found
-    unmasked = WithoutMasks(evidence.results)
-    try:
-        unmasked.replicates("main", EUPG)
-    except Missing:
-        return replace(found, remark=f"{found.remark} EUPG without masks: {NO_RUNS}.".strip())
-    other = measure(claim, unmasked)
-    shown = {(row.what, str(row.ours)) for row in found.rows}
-    differing = (row for row in other.rows if (row.what, str(row.ours)) not in shown)
-    rows = [replace(row, what=f"{row.what}; EUPG without masks") for row in differing]
+    unmasked = WithoutMasks(evidence)
+    other = measure(claim, unmasked) if unmasked.is_there() else Finding([], NO_RUNS)
+    if other.verdict == NO_RUNS or other.waits:
+        lacking = "too few training seeds" if other.waits else NO_RUNS
+        return replace(found, remark=f"{found.remark} EUPG without masks: {lacking}.".strip())
+    return of_both(found, other)
+
+
+def of_both(found: Finding, other: Finding) -> Finding:
+    """The finding of EUPG with masks and of that without, undecided where they part."""
+    rows = [replace(row, what=f"{row.what}; EUPG without masks") for row in other.rows if row not in found.rows]
     found = replace(found, rows=[*found.rows, *rows])
     if found.verdict not in (HOLDS, FAILS, UNDECIDED):
         return found
-    told = f"EUPG with masks: {found.verdict}; without: {other.verdict}."
-    verdict = found.verdict if other.verdict == found.verdict else UNDECIDED
-    return replace(found, verdict=verdict, remark=f"{found.remark} {told}".strip())
+    told = [f"{one.verdict}. {one.remark}".strip() for one in (found, other)]
+    small = found.small and other.small
+    return replace(
+        found,
+        verdict=found.verdict if other.verdict == found.verdict else UNDECIDED,
+        small=small,
+        reached=min(found.reached, other.reached) if small else np.nan,
+        remark=f"EUPG with masks: {told[0]} Without: {told[1]}",
+    )
 
 
 def measure(claim: Claim, evidence: Evidence) -> Finding:

@@ -279,13 +279,16 @@ def test_claims_on_eupg_are_undecided_where_masks_decide(five_seeds):
     finding, ours = found(performance.gated_beats_eupg, five_seeds)
     assert finding.verdict == HOLDS and finding.remark.endswith(f"EUPG without masks: {NO_RUNS}.")
 
-    evidence_of.cache_clear()
-    for seed in range(1, 6):
-        flags = {"vectorization": "lockstep", "masks": False}
-        write_run(five_seeds / f"u{seed}", "eupg_var_lambda", seed, (9.0 + seed,) * 3, (9.0,) * 3, **flags)
-    finding, ours = found(performance.gated_beats_eupg, five_seeds)
-    assert finding.verdict == UNDECIDED
-    assert finding.remark.endswith(f"EUPG with masks: {HOLDS}; without: {FAILS}.")
+    flags = {"vectorization": "lockstep", "masks": False}
+    for seeds, verdict, remark in (
+        ((1, 2, 3), HOLDS, "EUPG without masks: too few training seeds."),
+        ((4, 5), UNDECIDED, f"EUPG with masks: {HOLDS}. Without: {FAILS}."),
+    ):
+        evidence_of.cache_clear()
+        for seed in seeds:
+            write_run(five_seeds / f"u{seed}", "eupg_var_lambda", seed, (9.0 + seed,) * 3, (9.0,) * 3, **flags)
+        finding, ours = found(performance.gated_beats_eupg, five_seeds)
+        assert finding.verdict == verdict and finding.remark == remark
     assert ours["scalarised, Gated less EUPG"].low > 0.0
     assert ours["scalarised, Gated less EUPG; EUPG without masks"].high < 0.0
     # a claim on others has one reading, and of a level no verdict is told
@@ -293,6 +296,26 @@ def test_claims_on_eupg_are_undecided_where_masks_decide(five_seeds):
     finding, ours = found(performance.VALUES[performance.EUPG], five_seeds)
     assert finding.verdict == COMPARED and not finding.remark
     assert ours["scalarised return; EUPG without masks"].value > ours["scalarised return"].value + 5.0
+
+
+def test_a_claim_fails_by_a_small_effect_if_it_does_in_both_readings():
+    row = Row("difference", "", Number(1.0, 0.9, 1.1))
+    by_sign, by_size = Finding([row], FAILS), Finding([row], FAILS, small=True, reached=0.5)
+    assert not claims.of_both(by_size, by_sign).small
+    smaller = claims.of_both(by_size, replace(by_size, reached=0.2))
+    assert smaller.small and smaller.reached == 0.2 and smaller.rows == [row]
+    assert claims.of_both(by_size, Finding([row], HOLDS)).verdict == UNDECIDED
+    untestable = Finding([row], UNTESTABLE)
+    assert claims.of_both(untestable, untestable) == untestable
+
+
+def test_a_claim_on_eupg_names_the_runs_without_masks(tmp_path):
+    jobs = experiments.jobs(seeds=[1, 2])
+    evidence = Evidence(results_of(tmp_path / "runs", write_everything(tmp_path, jobs), jobs))
+    for claim in (claim for theme in claims.THEMES for claim in theme.CLAIMS):
+        evidence.asked_for_eupg = False
+        claims.measure(claim, evidence)
+        assert not evidence.asked_for_eupg or "variants" in claim.command.split()
 
 
 def test_no_difference_is_not_reproduced(tmp_path):

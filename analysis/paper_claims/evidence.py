@@ -74,7 +74,7 @@ def first_and_last(run, column: str, statistic: str = "mean") -> tuple[float, fl
     return parts[0], parts[-1]
 
 
-WITH_EUPG = only("main", "variants")  # EUPG is judged with masks and without: the paper names them for its PPOs alone
+WITH_EUPG = only("main", "variants")  # Variable λ EUPG is judged with masks and without
 
 
 class Evidence:
@@ -158,7 +158,18 @@ class Evidence:
 
 
 class WithoutMasks(Evidence):
-    """The same, but that the main table's EUPG chooses among all actions."""
+    """The same, but that the main table's Variable λ EUPG chooses among all actions."""
+
+    def __init__(self, evidence: Evidence):
+        super().__init__(evidence.results)
+        self._known = evidence._known  # keys tell rows apart
+
+    def is_there(self) -> bool:
+        """Whether it has been run."""
+        try:
+            return bool(self.replicates("main", EUPG))
+        except Missing:
+            return False
 
     def job(self, experiment: str, script: str, budget: float = 1.0, **flags) -> Job:
         """As Evidence.job; that of EUPG without masks for the main table's EUPG."""

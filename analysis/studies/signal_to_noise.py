@@ -392,6 +392,7 @@ def main(args: Args) -> None:
         "actions": ACTIONS,
         "contrasts": CONTRASTS,
         "weightings": WEIGHTINGS,
+        "weathers": "each site's own",
         "physics": physics_name(),
     }
     if all(stored.is_finished(path, settings) for path in files):

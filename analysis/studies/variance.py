@@ -78,8 +78,8 @@ def variance_components(values: np.ndarray) -> pd.Series:
 
     Site, weather and policy are drawn at random; "weather" is that within a site. The components estimate variances
     that add up to that of a value drawn at random, by the expected mean squares. They are unbiased, hence may be
-    negative where the true component is near zero; they are left so. With one weather a site what it adds is part of
-    the others.
+    negative where the true component is near zero; they are left so. With one weather a site the weather's is in the
+    site's, and weather x policy in site x policy.
     """
     sites, weathers, policies = values.shape
     freedom = max(weathers - 1, 1)
@@ -112,9 +112,9 @@ def shares(components: pd.Series) -> pd.Series:
 
 
 def split(values: np.ndarray) -> pd.DataFrame:
-    """Components, their shares and the shares' 95 % interval over resampled sites.
+    """Components, their shares and the shares' 95 % interval over resampled sites, the policies held.
 
-    values : (sites, weathers, policies).
+    values : (sites, weathers, policies). The intervals are a little narrow: resampled sites vary less than sites.
     """
     components = variance_components(values)
     generator = np.random.default_rng(0)
@@ -167,7 +167,8 @@ def with_intervals(returns: np.ndarray) -> pd.DataFrame:
 def site_effect(site_means: np.ndarray, features: pd.DataFrame) -> dict[str, float]:
     """Shares of the variance between sites that linear regressions explain, adjusted for their number of terms.
 
-    site_means : mean return of each site, (n,); features : `open_loop.site_features` of each.
+    site_means : mean return of each site, (n,), which has a part of its weathers' variance; features :
+    `open_loop.site_features` of each.
     """
     temperature, snow = ["boundary_above_air_k"], ["snow_mm_day"]
     explained = {
