@@ -13,8 +13,6 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from analysis import experiments, paths
 from analysis.paper_claims import (
     asymmetry,
@@ -45,6 +43,7 @@ from analysis.paper_claims.claim import (
     Finding,
     Missing,
     Number,
+    read_twice,
 )
 from analysis.paper_claims.evidence import Evidence, WithoutMasks
 from analysis.results import Results
@@ -143,15 +142,7 @@ def of_both(found: Finding, other: Finding) -> Finding:
     found = replace(found, rows=[*found.rows, *rows])
     if found.verdict not in (HOLDS, FAILS, UNDECIDED):
         return found
-    told = [f"{one.verdict}. {one.remark}".strip() for one in (found, other)]
-    small = found.small and other.small
-    return replace(
-        found,
-        verdict=found.verdict if other.verdict == found.verdict else UNDECIDED,
-        small=small,
-        reached=min(found.reached, other.reached) if small else np.nan,
-        remark=f"EUPG with masks: {told[0]} Without: {told[1]}",
-    )
+    return read_twice(found, other, ("EUPG with masks", "Without"))
 
 
 def measure(claim: Claim, evidence: Evidence) -> Finding:

@@ -338,7 +338,7 @@ def test_heuristics_are_paired_over_episodes(tmp_path):
     # gains 1 and 2 on both episodes: 1.5 over symmetric weights; the paper's plant on when a stand is full, and pay
     assert ours[performance.OBEYING].ends == (1.5, 1.5)
     assert ours["scalarised, +100 a year less zero change"].ends == (-1.0, -1.0)
-    assert (finding.verdict, finding.remark) == (UNDECIDED, f"Without masks: {HOLDS}; with masks: {FAILS}.")
+    assert (finding.verdict, finding.remark) == (UNDECIDED, f"Without masks: {HOLDS}. With masks: {FAILS}.")
 
 
 def test_that_management_can_is_shown_by_one_strategy_that_does(tmp_path):

@@ -133,6 +133,22 @@ def finding(rows: list[Row], answer: Answer, otherwise: str = FAILS) -> Finding:
     return Finding(rows, verdict, answer.rule, answer.waits, answer.small, answer.reached)
 
 
+def read_twice(first: Finding, second: Finding, names: tuple[str, str]) -> Finding:
+    """The finding of two readings of a claim, undecided where they part; small only if it is in both.
+
+    names : of the readings, as they are told.
+    """
+    told = (f"{name}: {one.verdict}. {one.remark}".strip() for name, one in zip(names, (first, second), strict=True))
+    small = first.small and second.small
+    return replace(
+        first,
+        verdict=first.verdict if second.verdict == first.verdict else UNDECIDED,
+        small=small,
+        reached=min(first.reached, second.reached) if small else np.nan,
+        remark=" ".join(told),
+    )
+
+
 @dataclass(frozen=True)
 class Claim:
     """A claim of the paper; `measure` turns the evidence into a finding, or raises Missing.

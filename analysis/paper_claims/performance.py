@@ -13,7 +13,6 @@ from analysis.paper_claims.claim import (
     LEAST,
     LEVEL,
     QUARTER,
-    UNDECIDED,
     Answer,
     Finding,
     Missing,
@@ -26,6 +25,7 @@ from analysis.paper_claims.claim import (
     below,
     claim,
     finding,
+    read_twice,
     short,
 )
 from analysis.paper_claims.evidence import (
@@ -266,10 +266,8 @@ def beats_heuristics(method: str):
 
 
 def beside_masks(rows: list[Row], answer: Answer, obeying: Answer) -> Finding:
-    """A finding on fixed strategies without masks, undecided where that on strategies that obey them is another."""
-    found, other = finding(rows, answer), finding(rows, obeying).verdict
-    told = f"Without masks: {found.verdict}; with masks: {other}."
-    return found if other == found.verdict else Finding(rows, UNDECIDED, found.rule, remark=told)
+    """A finding on fixed strategies, read without masks and with them."""
+    return read_twice(finding(rows, answer), finding(rows, obeying), ("Without masks", "With masks"))
 
 
 curriculum_beats_heuristics, gated_beats_heuristics = beats_heuristics(CURRICULUM), beats_heuristics(GATED)

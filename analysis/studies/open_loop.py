@@ -98,7 +98,7 @@ def seeds(site_seed: int, weather: int) -> sim.Seeds:
 
 
 def own_seeds(site_seed: int, weather: int, each: int) -> sim.Seeds:
-    """The same for weather number `weather` of the `each` that every site has for itself.
+    """Seeds of an episode under a weather that no other site has: number `weather` of the site's `each`.
 
     Sites that share weathers share their fires: a mean over them then varies by more than its sites tell.
     """
