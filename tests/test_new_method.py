@@ -1,6 +1,7 @@
 """docs/new_method.md as its reader follows it: the example's changes fit the script, and both examples run."""
 
 import importlib
+import json
 import re
 
 import pandas as pd
@@ -48,6 +49,8 @@ def test_the_followed_example(tmp_path):
     episodes = pd.read_csv(tmp_path / "run" / "episodes.csv")
     assert len(episodes) == 4 and episodes.site_seed.nunique() == 1
     assert len(pd.read_csv(tmp_path / "run" / "evaluation.csv")) == 2
+    config = json.loads((tmp_path / "run" / "config.json").read_text(encoding="utf-8"))
+    assert config["training_environment"] == {"group_size": 4}
 
 
 def test_the_environment_of_ones_own(tmp_path, monkeypatch):

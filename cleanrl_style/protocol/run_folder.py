@@ -332,8 +332,15 @@ class Run:
     # ------------------------------------------------------------------------------------------- while it runs
 
     def make_envs(self, **env_kwargs):
-        """The vector environment to train on, which ends with the run; env_kwargs : what the evaluation's lack."""
+        """The vector environment to train on, which ends with the run; env_kwargs : what the evaluation's lack.
+
+        config.json has them too, as "training_environment".
+        """
         args = self.args
+        if env_kwargs:
+            self.config["training_environment"] = env_kwargs
+            with self._writing():
+                self._write_config()
         later = lanes_of_evaluation(self.task, len(args.eval_weights), args.eval_episodes)
         if self.course is not None:
             later = [*self.course.lanes, *later]
