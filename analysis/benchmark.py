@@ -31,7 +31,7 @@ from analysis.machine import machine
 from analysis.paths import make_writable, results
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
-from cleanrl_style.protocol.hosts import split
+from cleanrl_style.protocol.workers import split_among_workers
 from sim.block import KERNELS
 from sim.stands import available_cores
 from sim.state import DAYS
@@ -314,7 +314,9 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
 
     kinds = {"lockstep": (32, [started(32)])}
     if not args.quick:
-        kinds = {"async": (8, [started(len(block), threads=1) for block in split(8, available_cores())])} | kinds
+        kinds = {
+            "async": (8, [started(len(indices), threads=1) for indices in split_among_workers(8, available_cores())])
+        } | kinds
     return [partial(measure, kind, *stands) for kind, stands in kinds.items()]
 
 

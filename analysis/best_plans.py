@@ -23,7 +23,7 @@ import pandas as pd
 
 from analysis import experiments, metrics, paths, stored
 from cleanrl_style import protocol
-from cleanrl_style.protocol import arguments, fronts, reference, sites
+from cleanrl_style.protocol import arguments, fronts, provenance, reference, sites
 from cleanrl_style.protocol.evaluation import lanes_of
 from sim.task.fronts import FOLDER, play_plans
 
@@ -178,7 +178,7 @@ def main(args: Args) -> None:
     plans_folder = args.folder or (Path("sim", "task", FOLDER) if ships else folder)
     paths.make_writable("--output-dir", folder)
     paths.make_writable("--folder", plans_folder)
-    physics = reference.physics_name()
+    physics = provenance.physics_name()
     for task in tasks:
         path = folder / f"{task.env_id}{'' if same_search else f'-{args.budget}-{args.seed}'}.csv"
         settings = {"budget": args.budget, "seed": args.seed, "physics": physics}

@@ -36,7 +36,7 @@ import tyro
 
 from analysis import metrics, paths, runs, stored
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference, sites
+from cleanrl_style.protocol import provenance, reference, sites
 from cleanrl_style.protocol.arguments import ask, groups_without_site
 from cleanrl_style.protocol.score import Comparison
 
@@ -227,7 +227,7 @@ def searched_plans(task: protocol.Task) -> pd.DataFrame | None:
     path = paths.studies() / "best_plans" / f"{task.env_id}.csv"
     if set(task.env_kwargs) - {"observation_groups"}:
         return None
-    if not path.exists() or stored.settings(path)["physics"] != reference.physics_name():
+    if not path.exists() or stored.settings(path)["physics"] != provenance.physics_name():
         print(f"{path} is not there, or of another physics: `python analysis/best_plans.py` makes it")
         return None
     table = stored.read(path, text=("plan",))
@@ -259,8 +259,7 @@ def main(args: Args) -> None:
                 table = evaluation_of(folder, config, task, args.episodes, split)
                 evaluations |= {f"{folder}, {policy}": rows for policy, rows in table.groupby("policy")}
             shifted, seeds = sites.of_split(tasks[0], args.episodes, split)
-            plans = reference.reference_returns(shifted, seeds)
-            plans = plans[plans.plan.str.isdigit()]
+            plans = reference.constant(reference.reference_returns(shifted, seeds))
             found[split] = judged(evaluations, plans)
             for name, table in evaluations.items():
                 scores[name, split] = Comparison(table, plans).score(table.policy.iloc[0])

@@ -15,7 +15,7 @@ import pandas as pd
 from analysis import paths, reduction
 from cleanrl_style.protocol import files, fronts
 from cleanrl_style.protocol.evaluation import POLICIES, PRIMARY
-from cleanrl_style.protocol.reference import physics_name
+from cleanrl_style.protocol.provenance import physics_name
 from cleanrl_style.protocol.run_folder import as_text
 
 SITE_SPECIFIC = "site-specific"  # the mode in which all episodes are of one site and weather

@@ -27,7 +27,7 @@ import numpy as np
 import boreal_env
 import sim
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference
+from cleanrl_style.protocol import provenance
 
 #: What is played: environment and arguments. Not played are the GPU, the interpreter, and other arguments than these.
 PLAYED = (
@@ -104,7 +104,9 @@ def of_tree(tree: Path) -> dict:
 def main(args: Args) -> None:
     """Play with both, compare, note."""
     if args.digests:
-        print(json.dumps({"source": reference.source(), "folder": str(Path(sim.__file__).parent), "of": digests()}))
+        print(
+            json.dumps({"source": provenance.physics_hash(), "folder": str(Path(sim.__file__).parent), "of": digests()})
+        )
         return
     here = Path(boreal_env.__file__).parent
     if not args.changed:
@@ -130,11 +132,11 @@ def main(args: Args) -> None:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(("source", "stands_for", "changed"))
-    if reference.own_source() != before["source"]:
-        table.writerow((reference.own_source(), before["source"], args.changed))
-    with protocol.replacing(reference.SAME_PHYSICS) as file:
+    if provenance.own_hash() != before["source"]:
+        table.writerow((provenance.own_hash(), before["source"], args.changed))
+    with protocol.replacing(provenance.SAME_PHYSICS) as file:
         file.write(text.getvalue().encode())
-    print(f"all {len(after['of'])} digests are the same: {reference.SAME_PHYSICS} has it")
+    print(f"all {len(after['of'])} digests are the same: {provenance.SAME_PHYSICS} has it")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from cleanrl_style.protocol import FLOAT_FORMAT, reference, replacing
+from cleanrl_style.protocol import FLOAT_FORMAT, provenance, replacing
 
 
 def write(path: Path, table: pd.DataFrame, settings: dict) -> None:
@@ -34,7 +34,7 @@ def settings(path: Path) -> dict:
 @cache
 def say_if_of_another_physics(path: Path) -> None:
     """One line on standard error, once, about a table that was made with another source of the simulator."""
-    if settings(path).get("physics", reference.physics_name()) != reference.physics_name():
+    if settings(path).get("physics", provenance.physics_name()) != provenance.physics_name():
         print(f"{path}: made with another source of the simulator; its command makes it anew", file=sys.stderr)
 
 

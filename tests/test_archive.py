@@ -7,7 +7,7 @@ import pytest
 from tiny_runs import TINY_RUNS, write_run
 
 from analysis import archive, make_tables, runs
-from cleanrl_style.protocol.reference import physics_name
+from cleanrl_style.protocol.provenance import physics_name
 
 
 def files_of(folder):

@@ -23,11 +23,11 @@ def constant(action):
 def test_it_is_played_at_its_shares_and_at_the_end():
     one, due = make(), []
     for step in range(20, 981, 20):
-        if one.is_due(step, last=step == 980):
+        if one.reach(step, last=step == 980):
             due.append(step)
     assert due == [60, 100, 200, 400, 700, 980]
     resumed = make(done=200)
-    assert not resumed.is_due(380, False) and resumed.is_due(420, False)
+    assert not resumed.reach(380, False) and resumed.reach(420, False)
 
 
 def test_its_episodes_are_no_test_s_and_its_weights_spread():

@@ -12,7 +12,7 @@ from tiny_runs import TINY_RUNS
 import sim
 from analysis import generalisation, paths, stored
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference, sites
+from cleanrl_style.protocol import provenance, sites
 from sim.task.episodes import BALANCED_WORLD
 from sim.task.shifts import INSIDE, SHIFTS, shifted, shifts_of
 
@@ -145,7 +145,7 @@ def run(tmp_path, monkeypatch):
     arguments = {"env_id": "boreal-balanced-v0", "mode": "generalist", "seed": 1, "site_seed": None}
     arguments |= {"eval_weights": WEIGHTS, "eval_episodes": 2, "thaw_formulation": "asymmetric"}
     config = {"script": "plus_100", "arguments": arguments, "not_default": {}, "primary_policy": "greedy"}
-    config["physics"] = reference.physics_name()
+    config["physics"] = provenance.physics_name()
     (folder / "config.json").write_text(json.dumps(config))
     episodes(2.0).to_csv(folder / "evaluation.csv", index=False)
     shutil.copy(TINY_RUNS / "zero_change" / "timing.csv", folder)
@@ -166,7 +166,7 @@ def run(tmp_path, monkeypatch):
     monkeypatch.setattr(protocol, "evaluate", evaluate)
     monkeypatch.setattr(protocol, "load_policy", lambda folder: None)
     monkeypatch.setattr(generalisation.reference, "reference_returns", plans)
-    monkeypatch.setattr(generalisation.reference, "physics_name", lambda: "physics")
+    monkeypatch.setattr(generalisation.provenance, "physics_name", lambda: "physics")
     for name in ("studies", "runs", "archive"):
         monkeypatch.setattr(paths, name, lambda name=name: tmp_path / name)
     return folder, played

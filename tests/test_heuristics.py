@@ -13,7 +13,7 @@ from analysis.runs import read_run
 from baselines_heuristic import conifer_restoration, plus_100, random_valid, target_density, zero_change
 from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
-from cleanrl_style.protocol import evaluation, reference, run_folder
+from cleanrl_style.protocol import evaluation, provenance, reference
 
 SCRIPTS = ("zero_change", "plus_100", "target_density", "conifer_restoration", "random_valid")
 
@@ -76,7 +76,7 @@ def test_no_torch_is_needed(monkeypatch):
     there = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else there(name))
     packages = {"numpy", "numba", "gymnasium", "pandas", "matplotlib", "moocore"}
-    assert {*run_folder.versions()} == packages | {"python", "processor", "MKL_CBWR", "ATEN_CPU_CAPABILITY"}
+    assert {*provenance.versions()} == packages | {"python", "processor", "MKL_CBWR", "ATEN_CPU_CAPABILITY"}
 
 
 def test_one_simulation_stands_for_every_weight(tmp_path):

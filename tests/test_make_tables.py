@@ -26,7 +26,7 @@ from analysis.tables import (
 )
 from analysis.tables.common import FORMATS, has_numbers
 from cleanrl_style.protocol.fronts import simplex_lattice
-from cleanrl_style.protocol.reference import physics_name
+from cleanrl_style.protocol.provenance import physics_name
 
 ROOT = Path(__file__).parents[1]
 MAIN = ("ppo_curriculum", "boreal-generalist-v0", "vectorization=lockstep")

@@ -8,14 +8,14 @@ import pytest
 
 from analysis import same_physics
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference
+from cleanrl_style.protocol import provenance, reference
 
 
 @pytest.fixture
 def compare(monkeypatch, tmp_path):
     """A function that compares this checkout with its last commit, given what either source makes."""
-    monkeypatch.setattr(reference, "SAME_PHYSICS", tmp_path / "same_physics.csv")
-    monkeypatch.setattr(same_physics.reference, "own_source", lambda: "new")
+    monkeypatch.setattr(provenance, "SAME_PHYSICS", tmp_path / "same_physics.csv")
+    monkeypatch.setattr(same_physics.provenance, "own_hash", lambda: "new")
     repository = tmp_path / "repository"
     git = ["git", "-C", str(repository), "-c", "user.name=a", "-c", "user.email=a@b"]
     subprocess.run(["git", "init", "-q", str(repository)], check=True)
@@ -35,26 +35,26 @@ def compare(monkeypatch, tmp_path):
         same_physics.main(same_physics.Args(changed="a message"))
         left = subprocess.run([*git, "worktree", "list"], capture_output=True, text=True, check=True).stdout
         assert len(left.splitlines()) == 1
-        return reference.source()
+        return provenance.physics_hash()
 
     return run
 
 
 def test_a_source_of_the_same_numbers_has_the_name_of_the_first(compare):
     assert compare({"a": "1", "b": "2"}, {"a": "1", "b": "2"}) == "old"
-    assert reference.physics_name() == "old"
+    assert provenance.physics_name() == "old"
 
 
 @pytest.mark.parametrize("before", [{"a": "1", "b": "3"}, {"a": "1"}])
 def test_a_source_of_other_numbers_has_its_own_name(compare, before):
-    reference.SAME_PHYSICS.write_text("source,stands_for,changed\nanother,old,\n")
+    provenance.SAME_PHYSICS.write_text("source,stands_for,changed\nanother,old,\n")
     with pytest.raises(SystemExit, match="other numbers in: b"):
         compare(before, {"a": "1", "b": "2"})
-    assert reference.source() == "new"
+    assert provenance.physics_hash() == "new"
 
 
 def test_a_note_that_is_shipped_has_a_source_and_what_it_stands_for():
-    lines = Path(reference.SAME_PHYSICS).read_text().splitlines()
+    lines = Path(provenance.SAME_PHYSICS).read_text().splitlines()
     assert lines[0] == "source,stands_for,changed"
     for line in lines[1:]:
         source, stands_for, changed = line.split(",", 2)

@@ -11,7 +11,7 @@ import pytest
 
 import sim
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference, score, summary, tracking
+from cleanrl_style.protocol import provenance, reference, score, summary, tracking
 
 PAIR = ["carbon", "thaw"]
 WEIGHTS = np.array([(0.0, 1.0), (0.5, 0.5), (1.0, 0.0)])
@@ -214,17 +214,17 @@ def test_the_fingerprint_is_of_what_numbers_depend_on(task, monkeypatch):
         protocol.Task.of("boreal-generalist-v0", observation_groups=("preference", "state"))
     )
     assert physics != reference.fingerprint(protocol.Task.of("boreal-balanced-v0"))
-    source = reference.bare('"""Of x."""\n\nx = "# 1"  # one\n\n\ndef f():\n    """Two."""\n    return x\n')
+    source = provenance.bare('"""Of x."""\n\nx = "# 1"  # one\n\n\ndef f():\n    """Two."""\n    return x\n')
     assert source == 'x = "# 1"\ndef f():\n    return x'
-    assert reference.bare("x = 1\n") != reference.bare("x = 2\n")
+    assert provenance.bare("x = 1\n") != provenance.bare("x = 2\n")
     simulator = Path(sim.__file__).parent
-    assert all((simulator / name).exists() for name in reference.NO_PHYSICS)
+    assert all((simulator / name).exists() for name in provenance.NO_PHYSICS)
     for path in simulator.rglob("*.py"):
         with path.open(encoding="utf-8") as file:
             comments = [
                 token.string for token in tokenize.generate_tokens(file.readline) if token.type == tokenize.COMMENT
             ]
-        found = reference.TEXT_OR_COMMENT.finditer(path.read_text(encoding="utf-8"))
+        found = provenance.TEXT_OR_COMMENT.finditer(path.read_text(encoding="utf-8"))
         assert [one[0] for one in found if one["text"] is None] == comments
 
 

@@ -19,8 +19,8 @@ import boreal_env
 import sim
 from analysis import experiments, metrics, paths, stored
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference, score
-from cleanrl_style.protocol.reference import reference_returns
+from cleanrl_style.protocol import provenance, score
+from cleanrl_style.protocol.reference import constant, reference_returns
 from sim.task.preference import check_weights
 
 ENVIRONMENTS = (experiments.GENERALIST, experiments.BALANCED)
@@ -41,8 +41,7 @@ class Args:
 def study(env_id: str, episodes: int) -> pd.DataFrame:
     """Returns of every constant plan on the episodes of the evaluation."""
     task = protocol.Task.of(env_id)
-    table = reference_returns(task, protocol.evaluation_seeds(task, episodes))
-    table = table[table.plan.str.isdigit()]
+    table = constant(reference_returns(task, protocol.evaluation_seeds(task, episodes)))
     table = table.assign(env_id=env_id, action=table.plan.astype(int))
     return table[["env_id", "action", "seed", *metrics.return_columns(task.objectives)]]
 
@@ -95,7 +94,7 @@ def main(args: Args) -> None:
     folder = paths.studies(args.quick)
     sites = experiments.SITE_SEEDS[: 1 if args.quick else None]
     environments = (*ENVIRONMENTS, *MORE[: 1 if args.quick else None])
-    physics = reference.physics_name()
+    physics = provenance.physics_name()
     tables = {
         "constant_plans": (
             {"episodes": args.eval_episodes, "environments": environments, "physics": physics},

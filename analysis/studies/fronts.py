@@ -27,7 +27,7 @@ from analysis.studies.genes import Budget
 from analysis.studies.open_loop import GAINS, RETURNS, with_gains
 from cleanrl_style import protocol
 from cleanrl_style.flags import require
-from cleanrl_style.protocol import reference
+from cleanrl_style.protocol import provenance
 
 YEARS = 50
 BLOCK_YEARS = 5
@@ -218,7 +218,7 @@ def main(args: Args) -> None:
         "block_years": BLOCK_YEARS,
         "columns": RETURNS + STAND,
         "weathers": "each site's own",
-        "physics": reference.physics_name(),
+        "physics": provenance.physics_name(),
     }
     paths.make_writable("--output-dir", folder)
     finished = {case: stored.is_finished(path_of(folder, *case), settings | {"case": case}) for case in todo}

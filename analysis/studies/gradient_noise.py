@@ -25,7 +25,7 @@ from analysis.experiments import GENERALIST
 from analysis.studies import open_loop
 from cleanrl_style import eupg_var_lambda as eupg
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference
+from cleanrl_style.protocol import provenance
 
 ENV_ID = GENERALIST
 AGENT_SEED = 1
@@ -212,7 +212,7 @@ def main(args: Args) -> None:
         **design._asdict(),
         "agent_seed": AGENT_SEED,
         "first_seed": FIRST_SEED,
-        "physics": reference.physics_name(),
+        "physics": provenance.physics_name(),
     }
     if stored.is_finished(path, settings):
         print(f"{path} is finished")

@@ -20,7 +20,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference
+from cleanrl_style.protocol import provenance
 
 YEARS = 50
 STAND = {
@@ -173,7 +173,7 @@ def main(args: Args) -> None:
         "pairs": list(PAIRS),
         "off": OFF,
         "means": MEANS,
-        "physics": reference.physics_name(),
+        "physics": provenance.physics_name(),
     }
     if stored.is_finished(path, settings):
         print(f"{path} is finished")

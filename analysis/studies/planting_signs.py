@@ -22,7 +22,7 @@ from analysis import paths, stored
 from analysis.studies import open_loop, sensitivity
 from analysis.studies.sensitivity import DEFAULT, Variant
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference
+from cleanrl_style.protocol import provenance
 from sim.stands import available_cores
 from sim.task.episodes import BALANCED_WORLD
 
@@ -94,7 +94,7 @@ def play_all(chosen: list[Variant], args: Args, played) -> pd.DataFrame:
 
 def settings(args: Args) -> dict:
     """What a table hangs on; another simulator or step makes it stale."""
-    physics = reference.physics_name()
+    physics = provenance.physics_name()
     worlds = ", ".join(WORLDS)
     return {"worlds": worlds, "sites": args.sites, "years": args.years, "share": sensitivity.SHARE, "physics": physics}
 

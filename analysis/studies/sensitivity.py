@@ -22,7 +22,7 @@ from analysis import stored
 from analysis.paths import make_writable
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference
+from cleanrl_style.protocol import provenance
 from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.stands import available_cores
 
@@ -353,7 +353,7 @@ def main(args: Args) -> None:
         "weathers": WEATHERS,
         "years": YEARS,
         "share": SHARE,
-        "physics": reference.physics_name(),
+        "physics": provenance.physics_name(),
     }
     groups: dict[str, list[Variant]] = {}
     for variant in everything:

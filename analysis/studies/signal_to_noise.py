@@ -31,7 +31,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol.reference import physics_name
+from cleanrl_style.protocol.provenance import physics_name
 from sim.draws import streams_of
 
 YEARS = 50

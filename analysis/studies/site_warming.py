@@ -19,7 +19,7 @@ from analysis import results, stored
 from analysis.reduction import as_text
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import reference
+from cleanrl_style.protocol import provenance
 
 YEARS = 50
 EACH = 60  # episodes of each kind and run
@@ -87,7 +87,7 @@ def main(args: Args) -> None:
         "seeds": seeds,
         "each": each,
         "years": years,
-        "physics": reference.physics_name(),
+        "physics": provenance.physics_name(),
         "samples": digest(curricula),
     }
     if stored.is_finished(path, settings):

@@ -113,7 +113,7 @@ def load_policy(run_or_name, script=None) -> Policy:
 
     try:
         saved = load_whole(path, weights_only=True)
-        run = saved.get("run") or json.loads((path.parent / "config.json").read_text(encoding="utf-8"))
+        run = saved["run"]
         _check_run(saved, run)
     except (
         pickle.UnpicklingError,
@@ -125,8 +125,6 @@ def load_policy(run_or_name, script=None) -> Policy:
         ValueError,
     ) as error:
         raise ValueError(f"{path}: no policy that a script of this project has written") from error
-    except FileNotFoundError as error:
-        raise FileNotFoundError(f"{path}: config.json of its run has to lie beside it") from error
     except (OSError, zipfile.BadZipFile) as error:
         what = "cut short, or no policy that a script of this project has written"
         raise ValueError(f"{path}: {what} ({error})") from error
@@ -148,6 +146,7 @@ def load_policy(run_or_name, script=None) -> Policy:
     if not all(weights.isfinite().all() for weights in agent.state_dict().values()):
         raise ValueError(f"{path}: a weight of its network is not finite, so its training went wrong")
     probabilities, (size,) = module.make_policy(agent), envs.single_observation_space.shape
+    # a policy that looks at accrued returns answers with NaN to returns that are NaN
     unknown = np.full((1, _objectives(run["arguments"])), np.nan)
     looks_back = bool(np.isnan(probabilities(np.zeros((1, size), np.float32), np.ones((1, 25), bool), unknown)).any())
     source = str(path.absolute()), None if script is None else str(Path(script).absolute())

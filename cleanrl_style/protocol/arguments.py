@@ -19,7 +19,7 @@ from cleanrl_style.flags import (
     no_environment,
 )
 from cleanrl_style.protocol.fronts import evaluation_weights, return_columns
-from cleanrl_style.protocol.reference import reference_returns
+from cleanrl_style.protocol.reference import constant, reference_returns
 from cleanrl_style.protocol.sites import evaluation_seeds, published_seeds
 from cleanrl_style.protocol.task import Task
 from cleanrl_style.protocol.utility import SCALARIZATIONS, Chebyshev
@@ -106,8 +106,7 @@ def ideal_point(task: Task, given=None) -> tuple[float, ...]:
         weathers = 1 if task.mode == "site-specific" else ONE_SITE_EPISODES
         episodes = len(published_seeds("validation")) if task.draws_sites else weathers
         plans = reference_returns(task, evaluation_seeds(task, episodes, "validation"))
-        plans = plans[plans.plan.str.isdigit()]
-        given = plans.groupby("plan")[return_columns(task.objectives)].mean().max().round(2)
+        given = constant(plans).groupby("plan")[return_columns(task.objectives)].mean().max().round(2)
         shown = (f"{name} {value:g}" for name, value in zip(task.objectives, given, strict=True))
         print(f"Chebyshev's ideal point: {', '.join(shown)}")
     if len(given) != task.num_objectives or not np.isfinite(given).all():

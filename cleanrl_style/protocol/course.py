@@ -14,7 +14,7 @@ from cleanrl_style.protocol.compilation import compile_physics
 from cleanrl_style.protocol.evaluation import lanes_of, make_envs, play
 from cleanrl_style.protocol.fronts import return_columns, weight_columns
 from cleanrl_style.protocol.reference import NOTHING, PLUS_100, reference_returns
-from cleanrl_style.protocol.score import at_weights, best_constant_plans, by_weight, gains
+from cleanrl_style.protocol.score import at_weights, best_constant_plans, by_weight, gains, percent
 from cleanrl_style.protocol.sites import evaluation_seeds
 from cleanrl_style.protocol.task import Task
 
@@ -76,8 +76,8 @@ class Course:
         """Returns of the constant plans on its episodes."""
         return reference_returns(self.task, self.seeds)
 
-    def is_due(self, global_step: int, last: bool) -> bool:
-        """Whether a share of the training has been reached since it was last asked, or the end."""
+    def reach(self, global_step: int, last: bool) -> bool:
+        """Note how far the training is; returns whether it has passed one of the shares since, or is at its end."""
         before, self.done = self.done, global_step
         return last or any(before < share * self.steps <= global_step for share in self.shares)
 
@@ -111,5 +111,4 @@ class Course:
 
     def score(self, gained: pd.DataFrame) -> float:
         """The score of mean gains, a row a weight; NaN where no constant plan gains anything."""
-        whole = self.marks["best"].scalarized_gain.mean()
-        return 100 * gained.scalarized_gain.mean() / whole if whole > 0 else np.nan
+        return percent(gained.scalarized_gain.mean(), self.marks["best"].scalarized_gain.mean())

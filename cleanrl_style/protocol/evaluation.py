@@ -31,8 +31,8 @@ ASYMMETRIC = "asymmetric_thaw_return"
 
 def evaluation_columns(objectives) -> tuple[str, ...]:
     """Columns of evaluation.csv."""
-    scores = (*return_columns(objectives), "scalarized_return")
-    return ("policy", *weight_columns(objectives), "episode", "seed", "site_seed", *scores, *EVALUATION_INFO)
+    returns = (*return_columns(objectives), "scalarized_return")
+    return ("policy", *weight_columns(objectives), "episode", "seed", "site_seed", *returns, *EVALUATION_INFO)
 
 
 class PlainLoop(gym.vector.VectorEnv):
@@ -157,8 +157,9 @@ def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, spli
     """Evaluate a policy: every weight on the same episodes, by its most probable actions and by sampled ones.
 
     policy : a function of observations (n, d) float32, masks (n, 25) bool and accrued returns (n, m), giving action
-    probabilities (n, 25). weights : each a number (of two objectives, the first's weight) or m numbers. episodes : the
-    first of a split's sites, inside or outside the range of training (`sites.of_split`).
+    probabilities (n, 25). weights : each a number (of two objectives, the first's weight) or m numbers. episodes : how
+    many of each weight, on the first sites of split: "test", "validation" or one outside the range of training
+    (`sim.task.shifts`).
     Returns the table of episodes (`evaluation_columns`; with a thaw formulation other than asymmetric also ASYMMETRIC)
     and the statistics of the annual record over the episodes of each weight (None if there is no such record).
     """
@@ -192,8 +193,8 @@ def evaluate(task: Task, policy, weights, episodes: int, policies=POLICIES, spli
                 records[kind, k].append(report.pop("years"))
                 if other_formulation:
                     report[ASYMMETRIC] = asymmetric_thaw_return(records[kind, k][-1])
-            score = task.returns_row(weights[k], its_returns)
-            rows[kind, k, episode] = {"policy": kind, "episode": episode, "seed": seed, **score, **report}
+            returned = task.returns_row(weights[k], its_returns)
+            rows[kind, k, episode] = {"policy": kind, "episode": episode, "seed": seed, **returned, **report}
         progress.show(len(rows))
     in_order = [
         rows[kind, k, episode] for kind in policies for k in range(len(weights)) for episode in range(numbers[kind])

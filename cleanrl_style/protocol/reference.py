@@ -1,20 +1,16 @@
-"""What one can do without looking: returns of every constant plan on an evaluation's episodes.
+"""What one can do without looking: returns of constant plans and fixed strategies on an evaluation's episodes.
 
 A constant plan takes one action every year, wherever it can be carried out. The returns on the published sites ship
 with the code (analysis/reference_returns.py), under a fingerprint of the physics that they are of. Those of other
 episodes, of another environment or another physics are measured when they are first asked for.
 """
 
-import ast
 import contextlib
-import csv
-import functools
 import gzip
 import hashlib
 import io
 import json
 import os
-import re
 import zlib
 from importlib.resources import files
 from pathlib import Path
@@ -28,6 +24,7 @@ from cleanrl_style.protocol.evaluation import chunks, lanes_of, make_envs, play
 from cleanrl_style.protocol.files import replacing
 from cleanrl_style.protocol.fronts import return_columns
 from cleanrl_style.protocol.progress import Progress
+from cleanrl_style.protocol.provenance import physics_hash
 from cleanrl_style.protocol.task import Task
 from sim.jit import cache_folder
 from sim.management import CONIFER_MIXES, DENSITY_CHANGES
@@ -38,18 +35,11 @@ PLUS_100 = "22"  # the paper's: half conifers
 PLANS = (NOTHING, *(str(action) for action in range(25) if not 10 <= action < 15))
 FOLDER = "reference"
 FLOAT_FORMAT = "%.6g"
-# Of the simulator, what reads, draws, sends or plays, and makes no number of a year.
-NO_PHYSICS = ("executor.py", "io", "region", "task/fronts.py", "task/picture.py")
-#: Sources that were compared with an earlier one and make its numbers to the bit: analysis/same_physics.py.
-SAME_PHYSICS = Path(str(files("cleanrl_style.protocol"))) / "same_physics.csv"
-# A string of Python, or a comment. It goes through all source in 10 ms; the tokenizer took 200 ms of every start.
-TEXT_OR_COMMENT = re.compile(
-    r"""
-    (?P<text> ["]{3} (\\.|[^\\])*? ["]{3} | '{3} (\\.|[^\\])*? '{3} | " (\\.|[^"\\\n])* " | ' (\\.|[^'\\\n])* ')
-    | \#[^\n]*
-    """,
-    re.DOTALL | re.VERBOSE,
-)
+
+
+def constant(plans: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the constant plans alone."""
+    return plans[plans.plan.str.isdigit()]
 
 
 def title(plan: str) -> str:
@@ -60,51 +50,11 @@ def title(plan: str) -> str:
     return f"{'plant' if change > 0 else 'cut'} {abs(change):.0f} a year, {100 * mix:.0f} % conifers"
 
 
-# ------------------------------------------------------------------------------------------------ of which physics
-
-
 def fingerprint(task: Task) -> str:
     """Hash of all that a plan's returns depend on: environment, its arguments, source and tables of the simulator."""
     arguments = {name: value for name, value in task.env_kwargs.items() if name != "observation_groups"}
-    of_all = (source(), task.env_id, sorted(arguments.items()))
+    of_all = (physics_hash(), task.env_id, sorted(arguments.items()))
     return hashlib.sha256(repr(of_all).encode()).hexdigest()[:16]
-
-
-def physics_name() -> str:
-    """Name of this checkout's simulator and environment, that a run's config.json has."""
-    return source()[:16]
-
-
-def source() -> str:
-    """Hash of the first source that makes the same numbers as this one (`SAME_PHYSICS`): its own, if none is noted."""
-    with SAME_PHYSICS.open(newline="") as file:
-        noted = {row["source"]: row["stands_for"] for row in csv.DictReader(file)}
-    return noted.get(own_source(), own_source())
-
-
-@functools.cache
-def own_source() -> str:
-    """Hash of source and tables of simulator and environment, but for `NO_PHYSICS`."""
-    simulator, digest = Path(str(files("sim"))), hashlib.sha256()
-    apart = [simulator / name for name in NO_PHYSICS]
-    sources = [path for path in sorted(simulator.rglob("*.py")) if not {path, *path.parents} & set(apart)]
-    for path in [Path(boreal_env.__file__), *sources]:
-        digest.update(bare(path.read_text(encoding="utf-8")).encode())
-    for path in sorted(simulator.rglob("*.csv")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-def bare(source: str) -> str:
-    """Python source without comments, docstrings and empty lines."""
-    lines = TEXT_OR_COMMENT.sub(lambda found: found["text"] or "", source).splitlines()
-    scopes: list = [ast.parse(source)]
-    for scope in scopes:  # which grows by those inside
-        scopes += [node for node in scope.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))]
-        if ast.get_docstring(scope, clean=False) is not None:
-            first, last = scope.body[0].lineno, scope.body[0].end_lineno
-            lines[first - 1 : last] = [""] * (last - first + 1)
-    return "\n".join(line.rstrip() for line in lines if line.strip())
 
 
 # -------------------------------------------------------------------------------------------------- stored returns
@@ -149,7 +99,8 @@ def shipped(env_id: str):
 def reference_returns(task: Task, seeds: list[int]) -> pd.DataFrame | None:
     """Returns of every plan on the episodes with these seeds: plan, seed, a return for each objective.
 
-    None where the environment is not ours: what doing nothing is there is not known.
+    plan : the action of a constant plan, or a fixed strategy's name, which the tables that ship have besides.
+        None where the environment is not ours: what doing nothing is there is not known.
     """
     if not task.boreal:
         return None

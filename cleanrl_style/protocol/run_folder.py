@@ -4,18 +4,13 @@ import atexit
 import contextlib
 import csv
 import hashlib
-import importlib.metadata
-import importlib.util
 import io
 import json
-import os
 import pickle
-import platform
 import random
 import re
 import shutil
 import signal
-import subprocess
 import sys
 import time
 import zipfile
@@ -24,7 +19,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
-from llvmlite.binding import get_host_cpu_name
 
 from cleanrl_style.flags import fail
 from cleanrl_style.protocol import tracking, training_envs
@@ -34,7 +28,8 @@ from cleanrl_style.protocol.evaluation import PRIMARY, episodes_by_policy, lanes
 from cleanrl_style.protocol.files import is_cut, load_whole, replacing
 from cleanrl_style.protocol.fronts import objectives_of, weight_columns
 from cleanrl_style.protocol.progress import Progress
-from cleanrl_style.protocol.reference import physics_name, reference_returns
+from cleanrl_style.protocol.provenance import CODE, commit, physics_name, place_of, versions
+from cleanrl_style.protocol.reference import reference_returns
 from cleanrl_style.protocol.score import Comparison
 from cleanrl_style.protocol.summary import draw_summary, print_course, print_score, print_table
 from cleanrl_style.protocol.task import Task
@@ -59,12 +54,10 @@ RESULTS = (
     "cost.csv",
     "summary.png",
 )
-# Steps between checkpoints, at least: counted in steps, since by the clock the last one would differ each time.
+# A checkpoint follows each multiple of so many steps: by the clock the last one would differ each time.
 CHECKPOINT_STEPS = 2048
 #: How numbers are written into a run's tables.
 FLOAT_FORMAT = "%.9g"
-#: Of config.json, what says by which code beside the packages: the checkout's commit, the script's file.
-CODE = ("commit", "source")
 LONGEST_NAME = 200  # bytes of a folder's name; file systems allow 255
 
 
@@ -128,7 +121,7 @@ class Run:
             "physics": physics_name(),
         }
         self.envs, self.checkpoint, self.checkpoint_step = None, None, 0
-        self.env_seconds, self.shown, self.course = 0.0, None, None
+        self.env_seconds, self.progress_line, self.course = 0.0, None, None
         self.played_seconds = 0.0  # of a year and stand of the course
         with self._writing():
             self._claim_folder(tables)
@@ -238,7 +231,7 @@ class Run:
     # -------------------------------------------------------------------------------------------- checkpoints
 
     def save(self, global_step: int, last: bool, **state) -> None:
-        """Write a checkpoint if it is the last one, or CHECKPOINT_STEPS steps have passed.
+        """Write a checkpoint if it is the last one, or a multiple of CHECKPOINT_STEPS has been passed.
 
         state: what the algorithm needs to go on; environments, generators and tables are added to it.
         """
@@ -349,8 +342,10 @@ class Run:
 
     def progress(self, steps: int, done: int) -> Progress:
         """The line that says how far the training is; the time left has the evaluation in it."""
-        self.shown = Progress("training", steps, "steps", done, self.task.objectives, self._seconds_of_evaluation)
-        return self.shown
+        self.progress_line = Progress(
+            "training", steps, "steps", done, self.task.objectives, self._seconds_of_evaluation
+        )
+        return self.progress_line
 
     def _seconds_of_evaluation(self, rate: float) -> float:
         """What the evaluation will take, by the last play of the course, which is like it, or by the training."""
@@ -366,15 +361,15 @@ class Run:
         policy : as for `evaluate`. Its gains go into validation.csv, its score into the progress line. Does nothing in
         trainings too short for it, and in environments of which it is not known what doing nothing returns.
         """
-        if self.course is None or not self.course.is_due(global_step, last):
+        if self.course is None or not self.course.reach(global_step, last):
             return
         start = time.perf_counter()
         gained = self.course.play(policy)
         self.played_seconds = (time.perf_counter() - start) / self.course.years
         for row in gained.to_dict("records"):
             self.log("validation", {"global_step": global_step, **row})
-        if self.shown is not None:
-            self.shown.note = f"score {self.course.score(gained):.0f} on {self.course.where}"
+        if self.progress_line is not None:
+            self.progress_line.note = f"score {self.course.score(gained):.0f} on {self.course.where}"
         self.time("validation", global_step, time.perf_counter() - start)
 
     def log(self, table: str, row: dict) -> None:
@@ -551,14 +546,6 @@ def damage_of(folder: Path, weights: int) -> str | None:
     return policy.name if saved and not zipfile.is_zipfile(policy) else None
 
 
-def place_of(script: Path) -> str | None:
-    """The script's file, relative to the project where it lies in it; None of a name alone."""
-    if not script.is_file():
-        return None
-    file, root = script.resolve(), Path(__file__).resolve().parents[2]
-    return file.relative_to(root).as_posix() if file.is_relative_to(root) else str(file)
-
-
 def remove(path: Path) -> None:
     """Remove a file or a folder, if it is there."""
     if path.is_dir():
@@ -592,28 +579,3 @@ def as_text(value) -> str:
     if not isinstance(value, (list, tuple)):
         return str(value)
     return ",".join(f"{one:g}" if isinstance(one, (int, float)) else str(one) for one in np.ravel(value).tolist())
-
-
-def versions() -> dict:
-    """What numbers depend on beside the code: versions of Python and packages, and how torch calculates.
-
-    The processor, by LLVM's name, is for those on which torch cannot be told how (`cleanrl_style/__init__.py`).
-    """
-    packages = ("numpy", "numba", "gymnasium", "torch", "pandas", "matplotlib", "moocore")
-    there = [name for name in packages if importlib.util.find_spec(name)]  # fixed strategies do without torch
-    found = {name: importlib.metadata.version(name) for name in there}
-    arithmetic = {name: os.environ.get(name) for name in ("MKL_CBWR", "ATEN_CPU_CAPABILITY")}
-    return {"python": platform.python_version(), **found, "processor": get_host_cpu_name(), **arithmetic}
-
-
-def commit() -> str | None:
-    """The git commit of this checkout; None outside a checkout."""
-    root = Path(__file__).parents[2]
-    if not (root / ".git").exists():
-        return None
-    try:
-        command = ["git", "-C", root, "rev-parse", "HEAD"]
-        head = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    except FileNotFoundError:
-        return None
-    return head.stdout.strip() if head.returncode == 0 else None

@@ -19,7 +19,7 @@ from cleanrl_style.protocol.fronts import (
     weight_columns,
     weights_of,
 )
-from cleanrl_style.protocol.reference import NOTHING, PLUS_100
+from cleanrl_style.protocol.reference import NOTHING, PLUS_100, constant
 from cleanrl_style.protocol.utility import LINEAR, Utility
 
 
@@ -34,23 +34,23 @@ def by_weight(evaluation: pd.DataFrame):
     return evaluation.groupby(weights[0] if len(weights) == 1 else weights)
 
 
-def gains(evaluation: pd.DataFrame, zero_change: pd.DataFrame, utility: Utility = LINEAR) -> pd.DataFrame:
-    """The evaluation with the returns of zero change on the same site and weather subtracted; of utilities likewise.
+def gains(evaluation: pd.DataFrame, nothing: pd.DataFrame, utility: Utility = LINEAR) -> pd.DataFrame:
+    """The evaluation less the returns of doing nothing on the same site and weather; of utilities likewise.
 
-    Raises ValueError if zero change was not evaluated on every one of the evaluation's seeds.
+    Raises ValueError if doing nothing was not played on every one of the evaluation's seeds.
     """
     columns = return_columns(objectives_of(evaluation.columns))
-    reference = zero_change.drop_duplicates("seed").set_index("seed")[columns]
+    reference = nothing.drop_duplicates("seed").set_index("seed")[columns]
     missing = sorted(set(evaluation.seed) - set(reference.index))
     if missing:
         raise ValueError(
-            f"zero change was not evaluated on the episode with seed {missing[0]} "
-            f"(nor on {len(missing) - 1} others); evaluate both with the same --eval-episodes"
+            f"zero change was not evaluated on the episode with seed {missing[0]}, one of {len(missing)}; "
+            "evaluate both with the same --eval-episodes"
         )
     difference = evaluation.copy()
-    nothing = reference.loc[evaluation.seed].to_numpy()
-    difference[columns] -= nothing
-    difference["scalarized_return"] = utility.gain(nothing, returns_of(difference), weights_of(difference))
+    theirs = reference.loc[evaluation.seed].to_numpy()
+    difference[columns] -= theirs
+    difference["scalarized_return"] = utility.gain(theirs, returns_of(difference), weights_of(difference))
     return difference
 
 
@@ -70,8 +70,7 @@ def best_constant_plans(plans: pd.DataFrame, weights: np.ndarray, utility: Utili
 
     The best is chosen on the very episodes that it is reported on, which flatters it a little.
     """
-    constant = plans[plans.plan.str.isdigit()]
-    names, returns = zip(*((plan, returns_of(rows)) for plan, rows in constant.groupby("plan")), strict=True)
+    names, returns = zip(*((plan, returns_of(rows)) for plan, rows in constant(plans).groupby("plan")), strict=True)
     best = [names[int(np.argmax([utility(values, one).mean() for values in returns]))] for one in weights]
     tables = [at_weights(plans[plans.plan == plan], [one], utility) for plan, one in zip(best, weights, strict=True)]
     return pd.concat(tables, ignore_index=True)
@@ -86,8 +85,12 @@ def score(gained: pd.DataFrame, best: pd.DataFrame) -> float:
     ours, theirs = (np.unique(weights_of(table), axis=0) for table in (gained, best))
     if not np.array_equal(ours, theirs):
         raise ValueError(f"score: the same weights are allowed, policy {ours.tolist()}, plans {theirs.tolist()}")
-    whole = best.scalarized_return.mean()
-    return 100 * gained.scalarized_return.mean() / whole if whole > 0 else np.nan
+    return percent(gained.scalarized_return.mean(), best.scalarized_return.mean())
+
+
+def percent(gain: float, best: float) -> float:
+    """The score of a mean gain, where the best constant plans' is `best`."""
+    return 100 * gain / best if best > 0 else np.nan
 
 
 def front(gained: pd.DataFrame) -> np.ndarray:

@@ -131,8 +131,8 @@ class Task:
     @cached_property
     def episode_columns(self) -> tuple[str, ...]:
         """Columns of episodes.csv."""
-        scores = (*return_columns(self.objectives), "scalarized_return")
-        return ("global_step", "episode", "env", "site_seed", *weight_columns(self.objectives), *scores, *EPISODE_INFO)
+        returns = (*return_columns(self.objectives), "scalarized_return")
+        return ("global_step", "episode", "env", "site_seed", *weight_columns(self.objectives), *returns, *EPISODE_INFO)
 
     def weights_row(self, weights: np.ndarray) -> dict:
         """A table's columns of weights (m,)."""

@@ -13,8 +13,8 @@ import numpy as np
 from gymnasium.wrappers import OrderEnforcing, PassiveEnvChecker
 
 from cleanrl_style.protocol.compilation import compile_physics
-from cleanrl_style.protocol.hosts import Block, Streams, split
 from cleanrl_style.protocol.task import Task, as_option
+from cleanrl_style.protocol.workers import WorkerEnvs, WorkersVectorEnv, split_among_workers
 from sim.block import lanes_for
 from sim.stands import available_cores
 
@@ -22,15 +22,15 @@ WATCHING = (OrderEnforcing, PassiveEnvChecker)  # wrappers that only watch the c
 
 
 class InWorker(gym.Wrapper):
-    """A worker process's environment, or block of them, that can be given a preference and a state to continue from.
+    """A worker process's environment, or its several, that can be given a preference and a state to continue from.
 
     An error ends the process, after its traceback: passing it on through gymnasium would lose the traceback, or
     hang if the error cannot be pickled. Numbers that are not finite are an error.
     """
 
-    def __init__(self, env: gym.Env, worker: int, streams: range, preference=None):
+    def __init__(self, env: gym.Env, worker: int, indices: range, preference=None):
         super().__init__(env)
-        self.worker, self.streams, self.preference = worker, streams, preference
+        self.worker, self.indices, self.preference = worker, indices, preference
 
     def reset(self, *, seed=None, options=None):
         """As the environment's; with the fixed preference, if there is one."""
@@ -69,7 +69,7 @@ class InWorker(gym.Wrapper):
         try:
             return function(*args, **kwargs)
         except Exception:
-            end_process(self.streams)
+            end_process(self.indices)
 
 
 def is_wrapped(env: gym.Env) -> bool:
@@ -77,30 +77,30 @@ def is_wrapped(env: gym.Env) -> bool:
     return isinstance(env, gym.Wrapper) and (not isinstance(env, WATCHING) or is_wrapped(env.env))
 
 
-def name_of(streams: range) -> str:
+def name_of(indices: range) -> str:
     """Environment 1, environments 0 to 3."""
-    return f"environment {streams[0]}" if len(streams) == 1 else f"environments {streams[0]} to {streams[-1]}"
+    return f"environment {indices[0]}" if len(indices) == 1 else f"environments {indices[0]} to {indices[-1]}"
 
 
-def end_process(streams: range) -> None:
+def end_process(indices: range) -> None:
     """End a worker process, after the traceback of the error that is being handled."""
-    print(f"error in {name_of(streams)}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
+    print(f"error in {name_of(indices)}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
     os._exit(1)
 
 
-def make_env(task: Task, blocks: list[range], worker: int, env_kwargs: dict) -> gym.Env:
-    """The environment of a worker of an AsyncVectorEnv; blocks : the environments that each worker has."""
-    streams = blocks[worker]
+def make_env(task: Task, indices_by_worker: list[range], worker: int, env_kwargs: dict) -> gym.Env:
+    """The environment of a worker of an AsyncVectorEnv; indices_by_worker : the environments that each worker has."""
+    indices = indices_by_worker[worker]
     try:
         option = None if task.preference is None or task.boreal else as_option(task.preference)
         env = task.make(**env_kwargs)
         if task.bare:
-            env = Block(env.unwrapped, streams, len(blocks[0]))
-        return InWorker(env, worker, streams, option)
+            env = WorkerEnvs(env.unwrapped, indices, len(indices_by_worker[0]))
+        return InWorker(env, worker, indices, option)
     except Exception:
         if multiprocessing.parent_process() is None:  # AsyncVectorEnv makes one more to look at its spaces
             raise
-        end_process(streams)
+        end_process(indices)
 
 
 def make_training_envs(
@@ -112,16 +112,16 @@ def make_training_envs(
     lanes_later : of kernels that the run needs after its training, compiled meanwhile.
     env_kwargs : arguments of theirs that the evaluation's do not have.
     """
-    blocks = split(num_envs, available_cores() if task.bare else num_envs)
+    indices_by_worker = split_among_workers(num_envs, available_cores() if task.bare else num_envs)
     if task.boreal:
         if task.preference is not None:
             env_kwargs["fixed_preference"] = as_option(task.preference)
         shared = [lanes_for(num_envs, available_cores())]
-        apart = [lanes_for(len(streams), 1) for streams in blocks]
+        apart = [lanes_for(len(indices), 1) for indices in indices_by_worker]
         compile_physics(shared if vectorization == "lockstep" else apart, lanes_later)
     if vectorization == "lockstep":
         return task.make_lockstep(num_envs, **env_kwargs)
-    make = [partial(make_env, task, blocks, worker, env_kwargs) for worker in range(len(blocks))]
+    make = [partial(make_env, task, indices_by_worker, worker, env_kwargs) for worker in range(len(indices_by_worker))]
     # Ctrl-C reaches all processes of a terminal: the workers leave it to the main one, which then ends them
     handlers = {
         number: signal.signal(number, handler)
@@ -129,7 +129,7 @@ def make_training_envs(
     }
     try:
         if task.bare:
-            return Streams(make, blocks)
+            return WorkersVectorEnv(make, indices_by_worker)
         return gym.vector.AsyncVectorEnv(make, autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
     except (EOFError, ConnectionError):
         sys.exit("error: an environment could not be made: its error is above")
@@ -148,7 +148,7 @@ def get_states(envs: gym.vector.VectorEnv):
 
 def set_states(envs: gym.vector.VectorEnv, states) -> None:
     """Continue from `get_states`."""
-    if isinstance(envs, Streams):
+    if isinstance(envs, WorkersVectorEnv):
         envs.set_states(states)
     elif isinstance(envs, gym.vector.AsyncVectorEnv):
         envs.call("set_states", states)
@@ -161,13 +161,14 @@ def end(envs: gym.vector.VectorEnv) -> list[str]:
     pool = envs.unwrapped
     if not isinstance(pool, gym.vector.AsyncVectorEnv) or pool.closed:
         return []
-    blocks = envs.blocks if isinstance(envs, Streams) else split(envs.num_envs, envs.num_envs)
+    several = isinstance(envs, WorkersVectorEnv)
+    of_workers = envs.indices_by_worker if several else split_among_workers(envs.num_envs, envs.num_envs)
     dead, deadline = [], time.monotonic() + 0.1  # of all together: there may be a thousand
-    for streams, process in zip(blocks, pool.processes, strict=True):
+    for indices, process in zip(of_workers, pool.processes, strict=True):
         process.join(timeout=0 if dead else max(deadline - time.monotonic(), 0))
         if process.exitcode is not None:
             cause = f"signal {-process.exitcode}" if process.exitcode < 0 else "its error above"
-            worker = name_of(streams) if len(streams) == 1 else f"the worker of {name_of(streams)}"
+            worker = name_of(indices) if len(indices) == 1 else f"the worker of {name_of(indices)}"
             dead.append(f"{worker} was ended by {cause}")
         process.kill()
         process.join()

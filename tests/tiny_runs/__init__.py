@@ -11,7 +11,7 @@ import pandas as pd
 from cleanrl_style.protocol import EPISODE_INFO
 from cleanrl_style.protocol.evaluation import evaluation_columns
 from cleanrl_style.protocol.fronts import return_columns, weight_columns
-from cleanrl_style.protocol.reference import physics_name
+from cleanrl_style.protocol.provenance import physics_name
 
 TINY_RUNS = Path(__file__).parent
 

@@ -1,4 +1,4 @@
-"""Several streams in a worker: to a script, workers with one each."""
+"""Several environments in a worker: to a script, workers with one each."""
 
 import copy
 import os
@@ -56,8 +56,8 @@ def seen(envs):
     """Observations, rewards, ends and infos over two episodes, of equal lengths and then of others."""
     trace = [envs.reset(seed=list(range(50, 50 + NUMBER)))[0], envs.call("action_masks")]
     trace += [part for row in ACTIONS for part in envs.step(row)]
-    for stream in ([1, 6], [7]):
-        mask = np.isin(np.arange(NUMBER), stream)
+    for some in ([1, 6], [7]):
+        mask = np.isin(np.arange(NUMBER), some)
         trace.append(envs.reset(seed=9, options={"preference": 0.5, "reset_mask": mask})[0])
         trace += [part for row in ACTIONS[:3] for part in envs.step(row)]
     return [copy.deepcopy(one) for one in (*trace, envs.reset(seed=3)[0], envs.reset()[0])]
@@ -82,7 +82,7 @@ def test_a_script_sees_what_it_sees_of_a_worker_each(make, of_a_worker_each, cor
 
 
 @pytest.mark.parametrize("env_id", ["hosted-v0", "settled-v0"])
-def test_states_are_of_streams_whatever_the_workers(make, env_id):
+def test_states_are_of_environments_whatever_the_workers(make, env_id):
     """A run goes on where there are more cores, or fewer; whatever arguments its environments have."""
     task = protocol.Task.of(env_id)
     envs, others, resumed, alone = make(3, task), make(None, task), make(2, task), make(NUMBER, task)
@@ -109,7 +109,7 @@ def test_a_wrapped_environment_has_a_worker_for_itself(make):
     assert len(envs.processes) == NUMBER and envs.step(ACTIONS[1])[3].all()
 
 
-def test_an_error_names_the_streams_of_its_worker(make, capfd):
+def test_an_error_names_the_environments_of_its_worker(make, capfd):
     envs = make(3)
     envs.reset(seed=1)
     with pytest.raises((EOFError, ConnectionError)):

@@ -1,8 +1,8 @@
-"""Worker processes that each host several streams of episodes.
+"""Worker processes that each step several environments in lockstep.
 
-A stand costs least beside others: a block of stands in lockstep takes two fifths of the time that they take one by one.
-gymnasium's AsyncVectorEnv knows one environment a worker. So each worker has a `Block` of environments, which passes
-for one, and `Streams` gives a script the environments of all workers side by side, as if each had its own.
+A stand costs least beside others: stands in lockstep take two fifths of the time that they take one by one.
+gymnasium's AsyncVectorEnv knows one environment a worker. So each worker has `WorkerEnvs`, which pass for one,
+and `WorkersVectorEnv` gives a script the environments of all workers side by side, as if each had its own.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,39 +17,39 @@ from boreal_env import BorealEnv
 SETTINGS = "settings"  # of a state: the arguments of all its environments, which are alike
 
 
-def split(num_envs: int, cores: int) -> list[range]:
+def split_among_workers(num_envs: int, cores: int) -> list[range]:
     """Environments of each worker: neighbours, in no more workers than there are cores."""
     rows = -(-num_envs // cores)
     return [range(first, min(first + rows, num_envs)) for first in range(0, num_envs, rows)]
 
 
-class Block(gym.Env):
+class WorkerEnvs(gym.Env):
     """The environments of one worker, in lockstep on one thread.
 
     Observations, rewards, terminations and truncations have a row for each, and so has the action. AsyncVectorEnv wants
-    one shape of all workers: a block smaller than `rows`, the largest one's, has zeros below.
+    one shape of all workers: one with fewer than `rows`, which the largest has, has zeros below.
     """
 
-    def __init__(self, env: BorealEnv, streams: range, rows: int):
-        """env: one of them; streams: which of all environments these are."""
-        self.envs = env.lockstep(len(streams), threads=1)
-        self.streams, self.rows = streams, rows
+    def __init__(self, env: BorealEnv, indices: range, rows: int):
+        """env: one of them; indices: which of all environments these are."""
+        self.envs = env.lockstep(len(indices), threads=1)
+        self.indices, self.rows = indices, rows
         self.observation_space = batch_space(self.envs.single_observation_space, rows)
         self.action_space = batch_space(self.envs.single_action_space, rows)
 
     def reset(self, *, seed=None, options=None):
-        """seed: a list, one for each; options: as for one environment, and a `stream_mask` of all environments."""
+        """seed: a list, one for each; options: as for one environment, and a `mask_of_all` of all environments."""
         options = dict(options or {})
-        if "stream_mask" in options:
-            options["reset_mask"] = options.pop("stream_mask")[self.streams]
+        if "mask_of_all" in options:
+            options["reset_mask"] = options.pop("mask_of_all")[self.indices]
         if options.get("reset_mask", np.ones(1)).any():
             self.observations, _ = self.envs.reset(seed=seed, options=options)
         return self._filled(self.observations), {}
 
     def step(self, action):
-        """A step of all; episodes restart within it. The info of each is in a list: info["streams"]."""
-        self.observations, *results, infos = self.envs.step(action[: len(self.streams)])
-        info = {"streams": [info_of(infos, i) for i in range(len(self.streams))]} if infos else {}
+        """A step of all; episodes restart within it. The info of each is in a list: info["environments"]."""
+        self.observations, *results, infos = self.envs.step(action[: len(self.indices)])
+        info = {"environments": [info_of(infos, i) for i in range(len(self.indices))]} if infos else {}
         return *map(self._filled, (self.observations, *results)), info
 
     def action_masks(self) -> np.ndarray:
@@ -77,17 +77,17 @@ class Block(gym.Env):
         return filled
 
 
-class Streams(gym.vector.VectorWrapper):
-    """All environments of an AsyncVectorEnv whose workers have a `Block` each."""
+class WorkersVectorEnv(gym.vector.VectorWrapper):
+    """All environments of an AsyncVectorEnv whose workers have `WorkerEnvs`."""
 
     env: gym.vector.AsyncVectorEnv
 
-    def __init__(self, make: Sequence[Callable[[], gym.Env]], blocks: Sequence[range]):
-        """make: for each worker, what makes its block; blocks: its environments."""
-        # episodes restart in the block: to AsyncVectorEnv they never end
+    def __init__(self, make: Sequence[Callable[[], gym.Env]], indices_by_worker: Sequence[range]):
+        """make: for each worker, what makes its `WorkerEnvs`; indices_by_worker: `split_among_workers`."""
+        # episodes restart in the worker: to AsyncVectorEnv they never end
         super().__init__(gym.vector.AsyncVectorEnv(make, autoreset_mode=AutoresetMode.DISABLED))
-        self.blocks = blocks
-        self.used = np.concatenate([np.arange(len(block)) + k * len(blocks[0]) for k, block in enumerate(blocks)])
+        self.indices_by_worker, rows = indices_by_worker, len(indices_by_worker[0])
+        self.used = np.concatenate([np.arange(len(own)) + k * rows for k, own in enumerate(indices_by_worker)])
         one = self.env.single_observation_space
         self.single_observation_space = gym.spaces.Box(one.low[0], one.high[0], dtype=one.dtype)
         self.single_action_space = gym.spaces.Discrete(int(self.env.single_action_space.nvec[0]))
@@ -108,7 +108,7 @@ class Streams(gym.vector.VectorWrapper):
             raise ValueError(f"seed: one value or {self.num_envs} are allowed, got {len(seed)}")
         options = dict(options or {})
         if "reset_mask" in options:
-            options["stream_mask"] = options.pop("reset_mask")
+            options["mask_of_all"] = options.pop("reset_mask")
         observations, _ = self.env.reset(seed=self._by_worker(seed), options=options)
         return self._rows(observations), {}
 
@@ -118,13 +118,13 @@ class Streams(gym.vector.VectorWrapper):
         padded.reshape(-1)[self.used] = actions
         *results, of_workers = self.env.step(padded)
         infos: dict = {}
-        for block, own in zip(self.blocks, of_workers.get("streams", ()), strict=False):
-            for i, info in zip(block, own or (), strict=False):
+        for indices, own in zip(self.indices_by_worker, of_workers.get("environments", ()), strict=False):
+            for i, info in zip(indices, own or (), strict=False):
                 infos = self._add_info(infos, info, i)
         return *map(self._rows, results), infos
 
     def call(self, name: str, *args, **kwargs) -> tuple:
-        """Answers of all environments; a `Block` gives a list of its own."""
+        """Answers of all environments; `WorkerEnvs` give a list."""
         return tuple(answer for own in self.env.call(name, *args, **kwargs) for answer in own)
 
     def set_states(self, states: Sequence[dict]) -> None:
@@ -133,7 +133,7 @@ class Streams(gym.vector.VectorWrapper):
 
     def _by_worker(self, values: Sequence) -> list[list]:
         """What belongs to each environment, as a list for each worker."""
-        return [[values[i] for i in block] for block in self.blocks]
+        return [[values[i] for i in indices] for indices in self.indices_by_worker]
 
     def _rows(self, values: np.ndarray) -> np.ndarray:
         """Values (workers, rows, ..) as (environments, ..)."""
