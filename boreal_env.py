@@ -119,6 +119,7 @@ class Described:
     _spec: EnvSpec | None = None
 
     def _describe(self, number: int, arguments: dict, own: tuple[str, ...], threads: int | None = None) -> None:
+        """Check the arguments, make the episodes with their stands, and copy what they say of themselves."""
         self._arguments = check_arguments(arguments, own)
         self._episodes = Episodes(number, threads=threads, **self._arguments)
         self.mode: str = self._episodes.mode
@@ -539,7 +540,7 @@ def _spread(name, value, number) -> list:
     """One value for each environment, from one for all or a sequence."""
     if value is None or isinstance(value, dict) or np.ndim(value) == 0:
         return [value] * number
-    if isinstance(value, str) or len(value) != number:
+    if len(value) != number:
         raise ValueError(f"{name}: one value or {number} are allowed, got {len(value)}")
     return list(value)
 

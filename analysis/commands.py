@@ -152,7 +152,6 @@ def run(command: tuple[str, str, tuple[str, ...]]) -> tuple[int, str]:
     folder, log, words = command
     Path(log).parent.mkdir(parents=True, exist_ok=True)
     status = KILLED
-    Path(log).unlink(missing_ok=True)
     with own_core() as core:
         for _ in range(1 + RETRIES):
             if _STOPPED.is_set() or (status >= 0 and status != INTERRUPTED):
@@ -199,8 +198,10 @@ def stop() -> None:
 @contextlib.contextmanager
 def own_core() -> Iterator[int | None]:
     """A core that no other command has, by a lock that ends with it; None if none is free or none can be chosen."""
+    # not TMPDIR where it can be helped: each job may have its own
+    folder = Path("/tmp" if os.access("/tmp", os.W_OK) else tempfile.gettempdir())
     for core in sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") and fcntl else ():
-        with open(Path(tempfile.gettempdir()) / f"borearl-{os.getuid()}-core-{core}.lock", "w") as lock:
+        with open(folder / f"borearl-{os.getuid()}-core-{core}.lock", "w") as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:

@@ -18,4 +18,4 @@ if ((SLURM_ARRAY_TASK_MAX - SLURM_ARRAY_TASK_MIN + 1 != SLURM_ARRAY_TASK_COUNT))
     exit 1
 fi
 part=$((SLURM_ARRAY_TASK_ID - SLURM_ARRAY_TASK_MIN + 1))
-exec python analysis/sweep.py "$@" --address none --part "$part/$SLURM_ARRAY_TASK_COUNT"
+exec python analysis/sweep.py --workers "${SLURM_CPUS_PER_TASK:-1}" "$@" --address none --part "$part/$SLURM_ARRAY_TASK_COUNT"

@@ -11,8 +11,10 @@ on from its checkpoint. When all are finished, a row a run is in `--output`, and
 import dataclasses
 import itertools
 import json
+import os
 import re
 import signal
+import socket
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -267,8 +269,10 @@ def main(args: Args) -> None:
         print(f"{unfinished} runs of other parts are not finished; the table comes when they are")
         return
     table = table_of(found)
-    with protocol.replacing(args.output) as file:
+    apart = args.output.with_name(f"{socket.gethostname()}-{os.getpid()}-{args.output.name}")  # the parts end together
+    with protocol.replacing(apart) as file:
         table.to_csv(file, index=False, float_format=protocol.FLOAT_FORMAT, lineterminator="\n")
+    os.replace(apart, args.output)
     print(summary(table, list(found[0].settings)).to_string(index=False))
     print(f"wrote {args.output}")
 

@@ -2,8 +2,8 @@
 
 `simulate` runs one stand and returns a table; `read_forcing` makes its weather of a tower's file. `simulate_many` runs
 one on each of many sites, `sites_on_grid` makes those of a region. `Stands` steps many, for the environment.
-`sample_site` draws the parameters of a site. `docs/simulator.md` shows how to use it,
-`docs/model.md` has the equations.
+`sample_site` draws the parameters of a site. `docs/simulator.md` shows how to use them, `docs/model.md` has the
+equations. Of the source `year`, `day` and `step` have the order, `state` what they carry; each process has a file.
 """
 
 from importlib import import_module
@@ -54,7 +54,7 @@ __all__ = [
 ]
 
 
-#: What needs the task, whose observations a policy sees: name -> its file, loaded when it is asked for.
+#: Loaded when they are asked for, since they import `sim.task`, which imports `sim`.
 _OF_A_REGION = {"simulate_many": "sim.region.many", "sites_on_grid": "sim.region.grid"}
 
 

@@ -3,6 +3,7 @@
 Stands are rows of arrays, (stands, fields); a block has them as lanes of `sim.state.block_dtype`.
 """
 
+import contextlib
 import functools
 import logging
 import math
@@ -122,7 +123,8 @@ def kernel(lanes: int):
     """
     with MAKING:
         if lanes not in _MADE:
-            with alone(f"{lanes}_lanes"):
+            # what is on disk is loaded side by side: of a thousand jobs each would wait for all before it
+            with contextlib.nullcontext() if is_compiled(lanes) else alone(f"{lanes}_lanes"):
                 if not is_compiled(lanes):
                     _LOGGER.warning(compiling(lanes))
                 _MADE[lanes] = _made(lanes)

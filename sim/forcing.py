@@ -89,6 +89,7 @@ def generated_weather(b, day):
         spread = p.daily_noise_std_c[i] * between(1.0, larger, as_observed) * d.temperature_noise[day, i]
         memory = p.temperature_persistence[i]
         w.anomaly[i] = spread if first else memory * w.anomaly[i] + math.sqrt(1.0 - memory * memory) * spread
+        # the day's temperature with its anomaly, before the scenario's warming
         climate = daily_mean_temperature(
             cosine,
             sine,
@@ -122,8 +123,8 @@ def generated_weather(b, day):
         probability = p.winter_snow_prob[i] if winter else probability
         mean = p.winter_snow_mm_day[i] if winter else mean
         sensitivity = p.winter_precip_temp_sensitivity[i] if winter else sensitivity
-        # Rain follows the temperature of the season; snowfall that of the day's weather: cold spells are dry, but
-        # January is not drier than November.
+        # Rain follows how much warmer the day is than its season's base; snowfall only the day's anomaly: cold spells
+        # are dry, but January is not drier than November.
         departure = w.anomaly[i] * p.snowfall_limit[i] if winter else climate - base
         scale = 1.0 + p.snowfall_limit[i] * (p.snowfall_scale[i] - 1.0)
         mean = mean * scale if winter else mean
@@ -139,6 +140,7 @@ def generated_weather(b, day):
             swing,
         )
         wet = precipitation >= WET_DAY_MM
+        # warming is a cosine of the same seasons, on top of that
         temperature = daily_mean_temperature(
             cosine,
             sine,

@@ -16,6 +16,7 @@ import contextlib
 import functools
 import hashlib
 import os
+import pickle
 import sys
 import tempfile
 import threading
@@ -124,6 +125,15 @@ def made_ready(made, *nothing):
         made(*nothing)
     except OSError as error:  # a full disk: it is compiled, but not kept
         warn_uncached(error)
+        made(*nothing)
+    except (EOFError, pickle.UnpicklingError) as error:  # numba does not flush what it writes: a machine may die first
+        warnings.warn(
+            f"a file in {cache_folder()} is damaged ({error!r}): every process compiles the physics anew, for half a "
+            "minute, until that folder is deleted.",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        made = numba.njit(**OPTIONS)(made.py_func)
         made(*nothing)
     return made
 

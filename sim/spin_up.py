@@ -117,7 +117,7 @@ def most_biomass(stocks) -> tuple | None:
 
 
 def most_of_stems(stocks) -> tuple:
-    """The same, of stocks that have density or classes."""
+    """Stems [stems ha-1] and the most biomass that they hold [kgC m-2], of stocks that have density or classes."""
     first, largest = first_ages(DEFAULTS), largest_stems()
     by_class = [(stocks[name], k) for k, name in enumerate(CLASS_NAMES) if name in stocks]
     if by_class:
@@ -137,7 +137,7 @@ def largest_stems() -> np.ndarray:
 
 
 def check_initial_ranges(ranges: dict | None) -> dict[str, tuple[float, float]]:
-    """Ranges of first stocks, checked like `check_initial`; each a (low, high) pair. No stems have no biomass."""
+    """Ranges of first stocks, checked like `check_initial`; each a (low, high) pair. Without stems no biomass."""
     checked = {}
     for name, pair in check_mapping("initial_ranges", ranges).items():
         if name not in DRAWN:

@@ -1,6 +1,6 @@
 """Stands stepped year by year: the Python side of the simulator.
 
-Each stand's parameters, state, draws and record are rows of four arrays, (stands, fields). A year copies up to
+Each stand is a row of five arrays (`ARRAYS`); a year's draws are made from its streams. A year copies up to
 sixteen stands into the lanes of a block, calls the compiled kernel, and copies them back; blocks run on a pool of
 threads. So any subset of stands can be stepped together, in any order, with the same bits; and stands that are alike in
 all that a year depends on, as those of policies that have not parted yet, are simulated once.
@@ -68,8 +68,8 @@ from sim.state import (
     STATE_SIZE,
 )
 
-ARRAYS = ("parameters", "state", "record", "years", "streams")  # of what a state saves
-SAVED = (*ARRAYS, "seeds")  # that the future depends on
+ARRAYS = ("parameters", "state", "record", "years", "streams")  # that `get_state` copies
+SAVED = (*ARRAYS, "seeds")  # keys of `get_state`
 DRAWN_AT_ONCE = 1024  # stands whose numbers a thread draws, where a GPU simulates them
 LONGEST_STEP_MINUTES = 120  # beyond, the air is up to 2 K too warm
 MOST_THREADS = 10_000  # so that a mistake of a thousandfold is named
@@ -138,6 +138,7 @@ class Stands:
         self.scenario = check_scenario(scenario)
         if self.scenario is not None and CO2 in self.scenario.names and CO2 in (constants or {}):
             raise ValueError(f"constants: {CO2} follows the scenario; a value of your own is not allowed")
+        self.harvest_min_class, self.hwp_half_life_years = harvest_min_class, hwp_half_life_years
         self.first_cut_age = first_cut_age(harvest_min_class, self.constants)
         self.products_decay = yearly_decay(hwp_half_life_years)
         self.threads = check_threads(threads)
@@ -401,8 +402,8 @@ class Stands:
             "boundary": self.boundary,
             "soil_carbon": self.soil_carbon,
             "scenario": scenario,
-            "hwp_half_life_years": self.products_decay,
-            "harvest_min_class": self.first_cut_age,
+            "hwp_half_life_years": self.hwp_half_life_years,
+            "harvest_min_class": self.harvest_min_class,
         }
 
     def _run(

@@ -241,7 +241,10 @@ FORCING = (
 )
 
 
-#: What a step, a day or a year computes and hands on; nothing here lasts beyond the year.
+#: What a step, a day or a year computes and hands on; nothing here lasts beyond the year. The process that sets a name
+#: says what it is: grep "w.NAME" sim/*.py. *_sum: over the day's steps. *_before: a stock at the start of the year, of
+#: energy and water at that of the step. winter_up and winter_down: December to March; winter_air and winter_days: to
+#: February.
 _WORK = """
 above_deep_node advected air air_density air_emission air_sum amplitude anomaly bare_gain biomass_before
 boundary_conductance canopy_air canopy_log canopy_melt canopy_sublimation canopy_sum canopy_sw cos_latitude cos_peak

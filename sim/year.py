@@ -1,6 +1,7 @@
 """A year of a block of stands, in the order of the paper's Annual Simulation Timeline.
 
-A pure function of parameters, state, action and the year's random draws, all in the block `b` (see `sim.state`).
+It reads and writes nothing but the block `b` (parameters, state, action, the year's random draws: see `sim.state`), the
+observed forcing and the daily output.
 """
 
 from sim.account import clear_day, clear_year, end_day, write_record

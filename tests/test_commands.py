@@ -61,6 +61,13 @@ def test_what_is_killed_is_started_again(fake):
     assert (folder / "a starts").read_text() == "..." and (folder / "a done").exists()
 
 
+def test_the_log_of_an_earlier_start_stays(fake):
+    command, folder = fake
+    for what in ("fails", "ends"):
+        commands.run_all([command("a", what)], 1, workers=2)
+    assert "error: this one fails" in (folder / "logs" / "a.log").read_text()
+
+
 def test_one_that_waits_starts_when_those_before_it_have_ended(fake):
     command, folder = fake
     assert commands.run_all([command("a", "is slow"), command("b", "reads a", waits=True)], 2, workers=2) == []

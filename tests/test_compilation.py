@@ -169,6 +169,25 @@ def test_one_compiles_while_others_wait(cache, tmp_path):
     assert order == ["first", "second"]
 
 
+def test_what_is_on_disk_is_loaded_beside_others(cache, tmp_path, monkeypatch):
+    cache(tmp_path)
+    block.kernel(1)
+    cache(tmp_path)
+    monkeypatch.setattr(block, "alone", lambda name: pytest.fail("it waits for those that compile"))
+    assert block.kernel(1)(None, 1, 0, None, None) == 2
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+def test_a_damaged_file_of_the_cache_is_named_and_done_without(cache, tmp_path, kind):
+    cache(tmp_path)
+    block.kernel(1)
+    cache(tmp_path)
+    for path in tmp_path.rglob(f"*.{kind}"):
+        path.write_bytes(path.read_bytes()[:-1] if kind == "nbc" else b"")
+    with pytest.warns(RuntimeWarning, match=f"a file in {tmp_path}.* is damaged .* until that folder is deleted"):
+        assert block.kernel(1)(None, 1, 0, None, None) == 2
+
+
 @phase
 def product(a, b, c):
     for k in range(a.size):

@@ -215,3 +215,12 @@ def test_the_state_of_a_vector_environment_is_not_that_of_one():
         one.set_state(envs.get_state())
     with pytest.raises(ValueError, match="state of a single environment given to a vector one"):
         envs.set_state(one.get_state())
+
+
+def test_a_state_of_other_arguments_is_refused_by_the_values_that_were_given():
+    there, here = quick(hwp_half_life_years=30, harvest_min_class="mature"), quick(hwp_half_life_years=30)
+    there.reset(seed=1)
+    with pytest.raises(ValueError, match="of one with harvest_min_class = 'mature', this one has 'young'"):
+        here.set_state(there.get_state())
+    with pytest.raises(ValueError, match="of one with hwp_half_life_years = 30, this one has None"):
+        quick(harvest_min_class="mature").set_state(there.get_state())

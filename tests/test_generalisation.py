@@ -14,7 +14,7 @@ from analysis import generalisation, paths, stored
 from cleanrl_style import protocol
 from cleanrl_style.protocol import provenance, sites
 from sim.task.episodes import BALANCED_WORLD
-from sim.task.shifts import INSIDE, SHIFTS, shifted, shifts_of
+from sim.task.shifts import SHIFTS, shifts_of
 
 
 def table(seed, *points):
@@ -37,8 +37,8 @@ def test_a_shifted_environment_has_the_same_sites_but_for_the_shift(boundary):
     world = {**BALANCED_WORLD, "boundary": boundary}
     names = shifts_of(boundary)
     assert len(names) == 4
-    for name in (INSIDE, *names):
-        env = quick(years=1, **world, **shifted(name, boundary))
+    for name in (None, *names):
+        env = quick(years=1, **world, parameter_overrides=SHIFTS.get(name))
         env.reset(seed=7)
         site_seed = int(env._episodes.site_seeds[0])
         moved = sim.sample_site(site_seed, SHIFTS.get(name))
@@ -46,13 +46,6 @@ def test_a_shifted_environment_has_the_same_sites_but_for_the_shift(boundary):
         assert differs == set(SHIFTS.get(name, {}))
         found = dict(zip(sim.state.PARAMETER_NAMES, env._episodes.stands.parameters[0], strict=True))
         assert all(found[key] == moved[key] for key in differs)
-
-
-def test_a_shift_that_a_world_does_not_have():
-    with pytest.raises(ValueError, match=r"shift 'warmer_boundary': allowed are inside, warmer_air, further_north"):
-        shifted("warmer_boundary", "balanced")
-    with pytest.raises(ValueError, match=r"shift 'hotter': allowed are inside, warmer_boundary"):
-        shifted("hotter")
 
 
 # ------------------------------------------------------------------------------------------------------- ratios

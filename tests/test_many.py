@@ -1,5 +1,8 @@
 """Many sites at once: each as it is alone, in any chunks, killed or not; bad tables named by row and column."""
 
+import glob
+import os
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,7 +10,7 @@ import pytest
 import boreal_env
 import sim
 from sim.block import LANES
-from sim.region import many
+from sim.region import many, store
 from sim.region.store import in_words
 
 pytest.importorskip("zarr")
@@ -156,6 +159,22 @@ def test_killed_and_resumed_is_as_never_killed(where, chunks_of_twelve, tmp_path
     assert bytes_of(tmp_path / "killed.zarr") == bytes_of(tmp_path / "whole.zarr")
     assert not list(tmp_path.glob("*.partial"))
     assert resumed.action.to_numpy().tolist() == plan().tolist()
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/fd"), reason="says which files are open")
+def test_what_is_removed_is_closed_before(tmp_path, monkeypatch):
+    """NFS keeps an open file under another name in the folder, which then cannot be removed."""
+    unlink, removed = store.Path.unlink, []
+
+    def closed(path, *args, **kwargs):
+        if path.name == "lock":
+            held = [os.path.realpath(one) for one in glob.glob("/proc/self/fd/*")]
+            removed.append(str(path) in held)
+        unlink(path, *args, **kwargs)
+
+    monkeypatch.setattr(store.Path, "unlink", closed)
+    sim.simulate_many(table(2), 12, path=tmp_path / "a.zarr", years=1, **COARSE)
+    assert removed == [False] and [path.name for path in tmp_path.iterdir()] == ["a.zarr"]
 
 
 def test_another_simulation_is_not_gone_on_with(tmp_path):

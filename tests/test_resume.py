@@ -1,5 +1,6 @@
 """A run that is stopped, by whatever, and started again by the same command."""
 
+import errno
 import json
 import os
 import random
@@ -281,6 +282,25 @@ def test_of_two_processes_that_start_at_once_the_second_leaves_no_configuration(
             resume(tmp_path)
         first.communicate("\n")
     assert [path.name for path in tmp_path.iterdir()] == ["timing.csv"]
+
+
+def test_where_files_cannot_be_locked_a_run_says_so_and_goes_on(interrupted, tmp_path, monkeypatch, capsys):
+    def lockf(file, how):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(run_folder.fcntl, "lockf", lockf)
+    resume(copy(interrupted, tmp_path))
+    assert "its file system has no locks (No locks available); see that no other process" in capsys.readouterr().err
+
+
+def test_a_checkpoint_comes_after_the_rows_that_it_needs(interrupted, tmp_path, monkeypatch):
+    flushed, folder = [], copy(interrupted, tmp_path)
+    replacing, flush = run_folder.replacing, run_folder.Run._flush_tables
+    monkeypatch.setattr(run_folder.Run, "_flush_tables", lambda run: (flush(run), flushed.append("tables")))
+    monkeypatch.setattr(run_folder, "replacing", lambda path: (flushed.append(path.name), replacing(path))[1])
+    resume(folder)
+    needs = [k for k, name in enumerate(flushed) if name in ("checkpoint.pt", "evaluation.csv")]
+    assert len(needs) >= 2 and all(flushed[k - 1] == "tables" for k in needs)
 
 
 def test_a_full_disk_leaves_the_old_checkpoint(interrupted, tmp_path):

@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import json
+import os
 import pickle
 import random
 import re
@@ -168,6 +169,12 @@ class Run:
                 fcntl.lockf(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 fail(f"{self.folder}: another process is at work on this run")
+            except OSError as error:
+                print(
+                    f"warning: {self.folder}: its file system has no locks ({error.strerror}); see that no other "
+                    "process works on this run",
+                    file=sys.stderr,
+                )
         if occupied and self.args.overwrite:
             for name in (*RESULTS, *tracking.FOLDERS):
                 remove(self.folder / name)
@@ -250,10 +257,17 @@ class Run:
         # first into memory: what torch says of a full disk is not an OSError
         buffer = io.BytesIO()
         torch.save(state, buffer, pickle_module=BY_VALUE)
-        with self._writing(), replacing(self.folder / "checkpoint.pt") as file:
-            file.write(buffer.getvalue())
+        with self._writing():
+            self._flush_tables()
+            with replacing(self.folder / "checkpoint.pt") as file:
+                file.write(buffer.getvalue())
         self.checkpoint_step = global_step
         self.time("checkpoint", global_step, time.perf_counter() - start)
+
+    def _flush_tables(self) -> None:
+        """Have the disk take what the system holds of the tables: a checkpoint that outlives a machine needs them."""
+        for table in self.tables.values():
+            os.fsync(table.file.fileno())
 
     def _load_checkpoint(self) -> None:
         path = self.folder / "checkpoint.pt"
@@ -441,6 +455,7 @@ class Run:
             with replacing(self.folder / "summary.png") as file:
                 title = f"{self.script}, {self.args.env_id}, seed {self.args.seed}"
                 draw_summary(file, title, objectives, evaluation, years, self.folder, comparison, self.course)
+            self._flush_tables()
             with replacing(self.folder / "evaluation.csv") as file:
                 evaluation.to_csv(file, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
         if comparison is None:

@@ -1,5 +1,6 @@
 """The zarr store of a region: written chunk by chunk, gone on with where it was killed."""
 
+import contextlib
 import dataclasses
 import functools
 import hashlib
@@ -7,6 +8,7 @@ import json
 import os
 import re
 import shutil
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from types import CodeType
@@ -100,12 +102,16 @@ class Store:
         return self
 
     def __exit__(self, kind, error, trace) -> None:
-        if self.lock is not None:
-            if fcntl is None:  # Windows deletes no open file
-                self.lock.close()
-            if self.path.exists():
-                shutil.rmtree(self.partial)
-            self.lock.close()
+        if self.lock is None:
+            return
+        whole = self.path.exists()
+        if whole:
+            shutil.rmtree(self.partial / "written", ignore_errors=True)
+        self.lock.close()  # NFS and Windows delete no open file
+        if whole:
+            with contextlib.suppress(OSError):  # another process has begun there meanwhile
+                (self.partial / "lock").unlink()
+                self.partial.rmdir()
 
     def _compare(self, there: dict) -> None:
         """Refuse to go on with another simulation."""
@@ -200,6 +206,12 @@ def locked(path: Path, store: Path):
         except BlockingIOError:
             file.close()
             raise ValueError(f"{store}: another process is at work on it") from None
+        except OSError as error:
+            warnings.warn(
+                f"{store}: its file system has no locks ({error.strerror}); see that no other process works on it",
+                RuntimeWarning,
+                stacklevel=2,
+            )
     return file
 
 

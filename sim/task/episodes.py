@@ -176,8 +176,8 @@ class Episodes:
         return site_seed, episode_seed, draw_weights(generator, len(self.objective_names))
 
     def begin(self, indices, draws, preferences, sites, initial=None) -> None:
-        """Start episodes. draws : for each, `draw`'s result; preferences (weights), sites : for each, or None;
-        initial : as of `sim.Stands.start`."""
+        """Start episodes. draws : for each, `draw`'s result; preferences (weights), sites : lists with an
+        entry for each, which may be None; initial : as of `sim.Stands.start`."""
         for site in sites:
             # a whole site, as `sim.sample_site` gives one, has the sampled temperature beside its other parameters
             if self.stands.boundary == "balanced" and BOUNDARY in (site or ()) and len(site) < len(sim.SITE_PARAMETERS):

@@ -258,7 +258,10 @@ READY_OBJECTIVES = {
 
 
 def check_objectives(objectives: Sequence) -> tuple:
-    """Objectives of an environment, each once: names of the paper's, and `Objective`s, of which some have a name."""
+    """Objectives of an environment, each once: the paper's as names, all others as `Objective`s.
+
+    objectives : names (of the paper's, or of `READY_OBJECTIVES`) and `Objective`s. Raises ValueError for any other.
+    """
     allowed = (*PAPER_OBJECTIVES, *READY_OBJECTIVES)
     # a set has no order, and the reward vector would change its own from process to process
     if isinstance(objectives, (str, dict, set, frozenset)) or not np.iterable(objectives) or not len(objectives):

@@ -287,7 +287,7 @@ class Reader:
     def __init__(self, wanted: Sequence[str], names: Sequence[str] = OBSERVATION_NAMES):
         units = {row.name: (row.shift, row.scale) for row in ROWS}
         for name in set(wanted) - set(names):
-            raise ValueError(f"the observation has no entry {name!r}; OBSERVATION_NAMES of boreal_env has their names")
+            raise ValueError(f"the observation has no entry {name!r}; allowed: {', '.join(names)}")
         self.columns = [list(names).index(name) for name in wanted]
         of_weights = 0.0, 1.0  # of as many objectives as an environment has
         self.shift, self.scale = np.array([units.get(name, of_weights) for name in wanted]).T
@@ -297,10 +297,11 @@ class Reader:
 
 
 def in_unit(observations: np.ndarray, name: str, names: Sequence[str] = OBSERVATION_NAMES) -> np.ndarray:
-    """One entry of observations with these names, in its own unit again, shape (n,).
+    """One entry of observations, in its own unit again, float64, shape (n,).
 
-    Without names, of all that is observed of two objectives, or of all but the site. Raises ValueError for other
-    widths, with names for fewer than they are.
+    observations : (n, width). names : of their entries, in order, such as an environment's `observation_names`; more
+    entries may follow. Without names: all entries of a two-objective environment, with its site (105) or without (43).
+    Raises ValueError for an unknown entry, and for a width that does not fit.
     """
     width = np.shape(observations)[1] if np.ndim(observations) == 2 else 0
     if names is OBSERVATION_NAMES:

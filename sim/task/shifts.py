@@ -1,9 +1,6 @@
 """Sites outside the range that is sampled: how far a policy generalises, by one property or two at a time."""
 
-from sim.parameters import check_name
 from sim.spin_up import BOUNDARY
-
-INSIDE = "inside"
 
 #: Shift -> range of site parameters, beside the sampled one (`sim/site_parameters.csv`); all else is the site's own.
 SHIFTS = {
@@ -19,9 +16,3 @@ def shifts_of(boundary: str = "sampled") -> tuple[str, ...]:
     """Shifts of a world: a boundary in balance is found, not given, so warmer air takes its place there."""
     left_out = "warmer_boundary" if boundary == "balanced" else "warmer_air"
     return tuple(name for name in SHIFTS if name != left_out)
-
-
-def shifted(name: str, boundary: str = "sampled") -> dict:
-    """Arguments of an environment for a shift, none for `INSIDE`: the same site seeds then give the shifted sites."""
-    check_name("shift", name, (INSIDE, *shifts_of(boundary)))
-    return {} if name == INSIDE else {"parameter_overrides": dict(SHIFTS[name])}
