@@ -63,6 +63,7 @@ from sim.task.observation import (
     sample_site_observations,
 )
 from sim.task.preference import check_weights, draw_weights, observed_weights, spread_weights
+from sim.task.timber import TIMBER_COLUMNS
 
 __all__ = [
     "BALANCED_CARBON_SCALE",
@@ -85,6 +86,7 @@ __all__ = [
     "REWARD_COLUMNS",
     "Reward",
     "THAW_FORMULATIONS",
+    "TIMBER_COLUMNS",
     "action_masks",
     "carbon_reward",
     "check_weights",
@@ -117,6 +119,7 @@ class Described:
     """What both environments say of themselves."""
 
     _spec: EnvSpec | None = None
+    _lockstep: dict = {}  # of a vector environment: how it is stepped
 
     def _describe(self, number: int, arguments: dict, own: tuple[str, ...], threads: int | None = None) -> None:
         """Check the arguments, make the episodes with their stands, and copy what they say of themselves."""
@@ -147,13 +150,13 @@ class Described:
         return self._episodes.mask_function
 
     def lockstep(self, num_envs: int, **changes) -> "BorealVectorEnv":
-        """So many of these environments in lockstep: the same arguments, but for `changes`.
+        """So many of these environments in lockstep: the same arguments (and groups and threads), but for `changes`.
 
         TypeError for a subclass of BorealEnv, whose own methods would be lost.
         """
         if isinstance(self, BorealEnv) and type(self) is not BorealEnv:
             raise TypeError(f"{type(self).__name__}: lockstep is of BorealEnv itself, whose subclass it would ignore")
-        return BorealVectorEnv(num_envs, **{**self._arguments, **changes})
+        return BorealVectorEnv(num_envs, **{**self._arguments, **self._lockstep, **changes})
 
 
 # ---------------------------------------------------------------------------------------------------------------
@@ -395,6 +398,7 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
         if num_envs % group_size:
             raise ValueError(f"group_size = {group_size}: a divisor of num_envs = {num_envs} is allowed")
         self.num_envs, self.group_size = int(num_envs), int(group_size)
+        self._lockstep = {"group_size": self.group_size, "threads": threads}
         try:
             self._describe(self.num_envs, kwargs, ("num_envs", "group_size", "threads"), threads)
         except MemoryError as error:

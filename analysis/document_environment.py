@@ -43,7 +43,8 @@ FINAL_INFO = {
     "years": (
         "",
         "with `record_years`: dict of `year` (from 1) and the columns `boreal_env.HISTORY_NAMES`, each with "
-        "one value a year; units in `sim.state.RECORD`",
+        "one value a year; units in `sim.state.RECORD`, of rewards 1; with prices also `boreal_env.TIMBER_COLUMNS`, "
+        "which has their units, and `<name>_reward` and `<name>_clipped` of other objectives",
     ),
 }
 

@@ -98,7 +98,8 @@ def simulate(
         "xarray" for a Dataset of both with names and units of ALMA and CF (`sim.io.dataset`; `.to_netcdf(file)`). A
         part of a year has no annual values.
     boundary : temperature far below: "sampled", the site's; "balanced", that at which no heat flows through it below
-        the first stand; or a number [degC]. None: "balanced" with a forcing, unless the site has one, else "sampled".
+        the first stand, whatever the site has; or a number [degC]. None: "balanced" with a forcing, unless the site has
+        one, else "sampled".
     scenario : climate change, see `sim.Stands`; not with `forcing`, which is weather of its own.
     time_step_minutes : a divisor of a day of at most 120 minutes; by default 30, or the least multiple of the forcing's
         interval from 30 on that divides a day.
@@ -112,7 +113,8 @@ def simulate(
 
     Raises
     ------
-    ValueError for bad input, naming the value and what is allowed; `sim.PhysicsError` if a balance does not close.
+    ValueError for bad input, naming the value and what is allowed; `sim.PhysicsError` if a balance does not close;
+    ImportError for output="xarray" without xarray.
     """
     if not isinstance(output, str) or output not in OUTPUTS:
         raise ValueError(f"output {output!r}: allowed are {', '.join(OUTPUTS)}")
@@ -206,7 +208,8 @@ def simulate(
     about |= {"initial": stocks, "actions": per_year.tolist(), "boundary": boundary}
     about |= {"constants": {name: float(value) for name, value in (constants or {}).items()}}
     about |= {"mechanisms": {name: bool(value) for name, value in (mechanisms or {}).items()}}
-    about |= {"weather": weather, "soil_carbon": soil_carbon}
+    about |= {"weather": weather, "soil_carbon": soil_carbon, "harvest_min_class": harvest_min_class}
+    about |= {"hwp_half_life_years": "for ever" if hwp_half_life_years is None else float(hwp_half_life_years)}
     if scenario is not None:
         about["scenario"] = scenario if isinstance(scenario, str) else "a table"
     if forcing is not None:

@@ -74,7 +74,16 @@ def test_units_and_attributes_are_those_of_cf(dataset):
     assert '"latitude_deg"' in dataset.attrs["site"]
     found = json.loads(dataset.attrs["site"])["deep_boundary_temperature_k"]
     assert found == pytest.approx(float(dataset.SoilTemp[0, -1]))
-    assert {"constants", "mechanisms", "weather", "boundary", "soil_carbon"} <= set(dataset.attrs)
+    about = {
+        "constants",
+        "mechanisms",
+        "weather",
+        "boundary",
+        "soil_carbon",
+        "harvest_min_class",
+        "hwp_half_life_years",
+    }
+    assert about <= set(dataset.attrs)
     for name, variable in dataset.data_vars.items():
         if name != "time_bnds":
             assert variable.attrs["units"] and variable.attrs["long_name"], name

@@ -207,7 +207,7 @@ def test_a_cycle_that_is_none_is_refused(slope, hour, message):
 
 
 def test_only_a_cycle_is_a_cycle(daily):
-    with pytest.raises(ValueError, match="^cycle: a sim.DiurnalCycle is allowed, got None$"):
+    with pytest.raises(ValueError, match="^diurnal_cycle: a sim.DiurnalCycle is allowed, got None$"):
         half_hours(daily, LATITUDE, None)
 
 

@@ -211,6 +211,7 @@ def test_lockstep_has_the_same_arguments_but_for_the_changes():
             assert_same(a, b)
     with pytest.raises(ValueError, match="unknown argument 'carbon_price'"):
         env.lockstep(4, carbon_price=3)
+    assert envs.lockstep(6).group_size == 2 and envs.lockstep(3, group_size=1).group_size == 1
 
 
 @pytest.mark.parametrize("years", [50, 3])

@@ -54,7 +54,8 @@ def test_a_stand_of_a_table_is_what_it_is_alone(chunks_of_twelve):
     sites = table()
     found = sim.simulate_many(sites, plan(), years=YEARS, seed=7, boundary="balanced", **COARSE)
     assert dict(found.sizes) == {"stand": NUMBER, "year": YEARS} and found.year[0] == 2025
-    assert found.initial_density_stems_ha.attrs["units"] == "stems ha-1"
+    assert found.initial_density_stems_ha.attrs["units"] == "ha-1"
+    assert found.latitude_deg.attrs["units"] == "degrees_north"
     assert set(found.coords) == {"latitude_deg", "wind_speed_m_s", "initial_density_stems_ha", "seed", "year"}
     assert found.active_layer_depth_m.units == "m" and "thaw" in found.active_layer_depth_m.long_name
     for k in (0, 17, NUMBER - 1):
@@ -159,6 +160,16 @@ def test_killed_and_resumed_is_as_never_killed(where, chunks_of_twelve, tmp_path
     assert bytes_of(tmp_path / "killed.zarr") == bytes_of(tmp_path / "whole.zarr")
     assert not list(tmp_path.glob("*.partial"))
     assert resumed.action.to_numpy().tolist() == plan().tolist()
+
+
+def test_objectives_with_prices_have_units_and_need_no_preference():
+    world = {"objectives": ("carbon", "thaw", "timber"), "timber": "finland"}
+    variables = ("timber_m3_ha", "net_revenue_eur_ha", "timber_reward", "gpp_kgc_m2")
+    found = sim.simulate_many(table(2), None, years=1, variables=variables, **world, **COARSE)
+    assert [found[name].units for name in variables] == ["m3 ha-1", "EUR ha-1", "1", "kg m-2"]
+    assert (found.action == boreal_env.NO_CHANGE).all()
+    with pytest.raises(ValueError, match="unknown argument 'record_steps'"):
+        sim.simulate_many(table(2), years=1, record_steps=True, **COARSE)
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/fd"), reason="says which files are open")

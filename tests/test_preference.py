@@ -52,6 +52,11 @@ def test_of_one_objective_none_is_observed():
     np.testing.assert_array_equal(observations, play(quick(), ACTIONS, seed=1)[0][:, 1:])
     assert info["preference"].tolist() == [1.0] == env.reset()[0][:0].tolist() + [1.0]
     assert boreal_env.observed_weights(observations, 1).tolist() == [[1.0]] * 5
+    for wrong in (observations[0], observations[:, :1]):
+        with pytest.raises(ValueError, match=r"observations: shape \(n, 2 or more\) is allowed, got "):
+            boreal_env.observed_weights(wrong, 3)
+    with pytest.raises(ValueError, match="objectives: a positive integer is allowed, got 0"):
+        boreal_env.observed_weights(observations, 0)
 
 
 def test_the_constructor_fixes_weights_of_any_number():
@@ -152,7 +157,7 @@ def test_given_weights_are_kept_but_for_the_sign_of_zero():
     ("value", "message"),
     [
         ([0.5, 0.5], r"preference: a weight for each of 3 objectives"),
-        (0.5, r"preference: one value or 2 are allowed, got 0.5"),
+        (0.5, r"preference: a weight for each of 3 objectives, none negative, 1 in sum, is allowed, got 0.5"),
         (np.full((3, 3), 1 / 3), r"preference: one value or 2 are allowed, got 3"),
         ([WEIGHTS, [0.5, 0.5, 0.5]], r"1 in sum, is allowed, got \[0.5, 0.5, 0.5\]"),
     ],

@@ -51,7 +51,15 @@ VARIABLES = {
 #: Daily columns of the soil's temperatures, from the top of the mineral soil down.
 PROFILE = ("soil_top_temperature_c", "surface_soil_temperature_c", "deep_soil_temperature_c")
 #: Units of our tables as UDUNITS spells them.
-_UDUNITS = {"kgC m-2": "kg m-2", "stems ha-1": "ha-1", "m2 m-2": "1", "day of year": "1", "mm": "kg m-2"}
+UDUNITS = {
+    "kgC m-2": "kg m-2",
+    "stems ha-1": "ha-1",
+    "m2 m-2": "1",
+    "day of year": "1",
+    "mm": "kg m-2",
+    "degN": "degrees_north",
+    "degE": "degrees_east",
+}
 
 
 def import_xarray(what: str):
@@ -87,7 +95,7 @@ def to_dataset(
     variables["time_bnds"] = (("time", "bnds"), np.stack([time, time + np.timedelta64(1, "D")], axis=1))
     for column in annual.columns.drop("year"):
         unit, meaning = columns[column]
-        attributes = {"long_name": f"{meaning}, of the year", "units": _UDUNITS.get(unit, unit)}
+        attributes = {"long_name": f"{meaning}, of the year", "units": UDUNITS.get(unit, unit)}
         variables[f"annual_{column}"] = ("year", annual[column].to_numpy(), attributes)
 
     depth = [0.0, 0.5 * constants["surface_soil_depth_m"], constants["deep_soil_node_m"], constants["boundary_depth_m"]]

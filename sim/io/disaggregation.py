@@ -80,7 +80,7 @@ def diurnal_cycle(air: pd.Series, shortwave: pd.Series) -> DiurnalCycle:
     return DiurnalCycle(math.hypot(*slopes), 24.0 * peak / (2.0 * math.pi) % 24.0)
 
 
-def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = FOREST_CYCLE) -> pd.DataFrame:
+def half_hours(daily: pd.DataFrame, latitude_deg: float, diurnal_cycle: DiurnalCycle = FOREST_CYCLE) -> pd.DataFrame:
     """Half-hourly forcing of the simulator (`sim.state.FORCING`) from daily means, indexed by solar time.
 
     daily : a row a day, indexed by date, with air_temperature_c, one of vapour_pressure_hpa,
@@ -92,8 +92,8 @@ def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = F
     gap, a value beyond its limits, vapour far above the day's saturation pressure, and a deficit larger than it; and
     for what is no daily table of a place. `attrs["site"]` has what the days tell of the site, for `sim.simulate`.
     """
-    if not isinstance(cycle, DiurnalCycle):
-        raise ValueError(f"cycle: a sim.DiurnalCycle is allowed, got {cycle!r}")
+    if not isinstance(diurnal_cycle, DiurnalCycle):
+        raise ValueError(f"diurnal_cycle: a sim.DiurnalCycle is allowed, got {diurnal_cycle!r}")
     columns = _check_daily(daily, latitude_deg)
     daily = daily.loc[~leap_day(daily.index), columns]
     for name in daily:
@@ -101,8 +101,8 @@ def half_hours(daily: pd.DataFrame, latitude_deg: float, cycle: DiurnalCycle = F
     mean = {name: daily[name].to_numpy()[:, None] for name in daily}
     even = np.ones((len(daily), STEPS_PER_DAY))
 
-    swing = cycle.half_range_per_shortwave * mean["shortwave_w_m2"]
-    air = mean["air_temperature_c"] + swing * np.cos(2.0 * math.pi * (HOURS - cycle.peak_hour) / 24.0)
+    swing = diurnal_cycle.half_range_per_shortwave * mean["shortwave_w_m2"]
+    air = mean["air_temperature_c"] + swing * np.cos(2.0 * math.pi * (HOURS - diurnal_cycle.peak_hour) / 24.0)
     saturation = np.vectorize(saturation_water)(air)
     if "vapour_pressure_hpa" in mean:
         vapour = mean["vapour_pressure_hpa"]

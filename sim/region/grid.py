@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from sim.io.dataset import import_xarray
 from sim.region.site_table import COLUMNS, LATITUDE, LONGITUDE, SEED
 
 AXES = {LATITUDE: (LATITUDE, "latitude", "lat"), LONGITUDE: (LONGITUDE, "longitude", "lon")}  # names that files use
@@ -62,7 +63,7 @@ def check_axis(name: str, values) -> np.ndarray:
 
 def climate_at(climate, latitude: np.ndarray, longitude: np.ndarray) -> pd.DataFrame:
     """Columns of a table of sites at these points, of a gridded climate."""
-    import xarray
+    xarray = import_xarray("climate=")
 
     if isinstance(climate, (str, Path)):
         if not Path(climate).exists():
@@ -134,8 +135,7 @@ def nearest(values, points: dict):
             raise ValueError(
                 f"climate: {name} = {wanted[far][0]:g} lies outside the file's [{there[0]:g}, {there[-1]:g}]"
             )
-    import xarray
-
+    xarray = import_xarray("climate=")
     if LONGITUDE in points:  # from 179 E it is nearer to 180 W than to 177 E
         last, first = (
             values.isel({LONGITUDE: [k]}).assign_coords({LONGITUDE: values[LONGITUDE][[k]] + turn})

@@ -47,7 +47,7 @@ VARIABLES = (
     "fire_mortality",
 )
 #: Arguments of an environment that a table of sites leaves no room for.
-NOT_OF_MANY = ("mode", "years", "site_seed", "fixed_preference", "parameter_overrides", "record_years")
+NOT_OF_MANY = ("mode", "years", "site_seed", "fixed_preference", "parameter_overrides", "record_years", "record_steps")
 
 #: Arguments of the world that a policy was trained in, and may have to be told again.
 WORLD = ("weather", "boundary", "soil_carbon", "scenario")
@@ -65,7 +65,7 @@ def simulate_many(
     years: int = DEFAULT_YEARS,
     seed: int = 0,
     others: str = "middle",
-    preference=0.5,
+    preference=None,
     variables=VARIABLES,
     label: str | None = None,
     overwrite: bool = False,
@@ -81,14 +81,14 @@ def simulate_many(
     sites : DataFrame, a row a site: `latitude_deg`, and any other site parameters (`sim/site_parameters.csv`), first
         stocks (as `initial` of `sim.simulate`), `longitude_deg` and `seed` as further columns. `sim.sites_on_grid`
         makes one of a latitude-longitude grid.
-    actions : integer in [0, 25) for every year (12 changes nothing); a yearly plan, shape (years,), or one for each
-        site, shape (sites, years); or a policy: a function of observations (n, d) and valid actions (n, 25), and of
-        accrued returns (n, objectives) if it asks for a third, which gives actions (n,) or their probabilities (n, 25),
-        of which the largest is taken. It has no memory. One of `cleanrl_style.protocol.load_policy` is such.
+    actions : integer in [0, 25) for every year (12 and None change nothing); a yearly plan, shape (years,), or one for
+        each site, shape (sites, years); or a policy: a function of observations (n, d) and valid actions (n, 25), and
+        of accrued returns (n, objectives) if it asks for a third, which gives actions (n,) or their probabilities
+        (n, 25), of which the largest is taken. It has no memory. One of `cleanrl_style.protocol.load_policy` is such.
     path : zarr store to write; the same command goes on where it was killed. None keeps everything in memory.
     seed : of first state, weather and disturbances of row k is seed + k, unless the table has a column `seed`.
     others : site parameters that the table lacks: "middle" of their ranges, or "sampled" as an episode samples them.
-    preference : that a policy observes, a number or weights.
+    preference : that a policy observes, a number or weights (None: all equal).
     variables : columns of the annual record to keep; the rewards, `carbon_reward` and so on, are among them.
     label : what the store says of the actions (None: the plan, or the policy's name and a hash of what it does). A
         store of another label is not gone on with.
@@ -100,16 +100,18 @@ def simulate_many(
 
     Returns
     -------
-    xarray.Dataset of `variables` (stand, year), float32, with units, `action`, and the table's columns as coordinates;
-    read from the store as it is used. Its bytes hang neither on threads nor on address.
+    xarray.Dataset of `variables` (stand, year), float32, with units, `action`, and the table's columns as coordinates,
+    first stocks as `initial_<name>`. It is read from the store as it is used. Its bytes hang neither on threads nor on
+    address.
 
     Raises
     ------
-    ValueError naming row, column, value and what is allowed; `sim.PhysicsError` if a balance does not close.
+    ValueError naming row, column, value and what is allowed; `sim.PhysicsError` if a balance does not close;
+    ImportError without xarray or zarr.
     """
     for package in ("xarray", "zarr"):
         if find_spec(package) is None:
-            raise ValueError(f'simulate_many needs {package}: pip install -e ".[region]"')
+            raise ImportError(f'simulate_many needs {package}: pip install -e ".[region]"')
     for name, value in (("overwrite", overwrite), ("progress", progress)):
         if not isinstance(value, (bool, np.bool_)):
             raise ValueError(f"{name}: True or False is allowed, got {value!r}")
@@ -119,12 +121,14 @@ def simulate_many(
     check_noise_of(table, sites.index, one.stands)
     chosen, label = check_choice(actions, label, len(table), one)
     tell_of_training(actions, arguments)
-    size = chunk_size(len(table), one.years)
+    size, objectives = chunk_size(len(table), one.years), len(one.objective_names)
     plan = Plan(
         table=table,
         actions=chosen,
         years=one.years,
-        weights=check_weights(preference, len(one.objective_names)),
+        weights=check_weights(preference, objectives)
+        if preference is not None
+        else np.full(objectives, 1 / objectives),
         others=others,
         variables=check_variables(variables, one.history_names),
         arguments=arguments,
@@ -274,7 +278,7 @@ def check_choice(actions, label: str | None, sites: int, one: Episodes) -> tuple
         return actions, label or f"{name_of(actions)} {done} {code_of(actions)}"
     if isinstance(actions, str):
         raise ValueError(f"actions {actions!r}: a policy is allowed, which cleanrl_style.protocol.load_policy loads")
-    given = as_array(actions)
+    given = as_array(NO_CHANGE if actions is None else actions)
     if given.shape not in ((), (one.years,), (sites, one.years)):
         raise ValueError(
             f"actions of shape {given.shape}: an action, a plan of shape ({one.years},) or ({sites}, {one.years}), "

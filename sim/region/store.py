@@ -17,11 +17,13 @@ from typing import Any
 import numpy as np
 
 import sim
+from sim.io.dataset import UDUNITS
 from sim.region.plan import Plan
 from sim.region.site_table import COLUMNS
 from sim.scenario import FIRST_YEAR
 from sim.spin_up import INITIAL_LIMITS
 from sim.state import RECORD
+from sim.task.timber import TIMBER_COLUMNS
 
 try:
     import fcntl
@@ -135,7 +137,8 @@ class Store:
         group = zarr.create_group(store, zarr_format=3, attributes=attributes)
         for name in plan.table:
             values = plan.table[name].to_numpy()
-            units = {"units": COLUMNS[name][2]} if COLUMNS[name][2] else {}
+            unit = COLUMNS[name][2]
+            units = {"units": UDUNITS.get(unit, unit)} if unit else {}
             group.create_array(
                 coordinate(name), data=values, chunks=(number,), dimension_names=("stand",), attributes=units
             )
@@ -147,14 +150,14 @@ class Store:
             attributes={"long_name": "year of the weather"},
         )
         for name in (*plan.variables, "action"):
-            unit, meaning = RECORD.get(name, ("1", name.replace("_", " ")))
+            unit, meaning = {**RECORD, **TIMBER_COLUMNS}.get(name, ("1", name.replace("_", " ")))
             group.create_array(
                 name,
                 shape=(number, plan.years),
                 chunks=(plan.size, plan.years),
                 dtype="int8" if name == "action" else "float32",
                 dimension_names=("stand", "year"),
-                attributes={"units": unit, "long_name": meaning},
+                attributes={"units": UDUNITS.get(unit, unit), "long_name": meaning},
             )
         return group
 

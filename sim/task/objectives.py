@@ -181,7 +181,7 @@ class Objective:
     """An objective of your own, beside the paper's "carbon" and "thaw".
 
     value : function of the year's record to rewards (n,). The record is a dict of read-only columns (n,): those of
-    `HISTORY_NAMES`, of `TIMBER_COLUMNS` with prices, and of objectives before this one. For worker processes and
+    `HISTORY_NAMES`, with prices of `TIMBER_COLUMNS`, and of objectives before this one. For worker processes and
     pickling, a function at the top level of a module. low, high : limits of the reward; values are clipped to them. The
     record gets the columns `<name>_reward` and `<name>_clipped` (what was cut off), the last step's info
     `<name>_return`.

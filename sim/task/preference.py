@@ -44,11 +44,11 @@ def spread_weights(value, number: int, objectives: int) -> list:
     _refuse_labels(value, "preference")
     value = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
     several = _is_sequence(value)
-    for_all = not several if objectives == 2 else several and all(_is_number(weight) for weight in value)
+    for_all = not several or (objectives != 2 and all(_is_number(weight) for weight in value))
     if for_all:
         return [check_weights(value, objectives)] * number
-    if not several or len(value) != number:
-        raise ValueError(f"preference: one value or {number} are allowed, got {len(value) if several else value!r}")
+    if len(value) != number:
+        raise ValueError(f"preference: one value or {number} are allowed, got {len(value)}")
     return [None if one is None else check_weights(one, objectives) for one in value]
 
 
@@ -56,21 +56,35 @@ def draw_weights(generator: np.random.Generator, objectives: int) -> np.ndarray:
     """Weights (objectives,), uniform on the simplex: the gaps that objectives - 1 uniform draws leave in [0, 1]."""
     if not isinstance(generator, np.random.Generator):
         raise ValueError(f"generator: numpy.random.default_rng(seed) is allowed, got {generator!r}")
-    if isinstance(objectives, bool) or not isinstance(objectives, (int, np.integer)) or objectives < 1:
-        raise ValueError(f"objectives: a positive integer is allowed, got {objectives!r}")
+    _check_number(objectives)
     cuts = np.sort(generator.random(objectives - 1))
     return np.diff(cuts, prepend=0.0, append=1.0)
 
 
 def observed_weights(observations: np.ndarray, objectives: int) -> np.ndarray:
-    """Weights (n, objectives), float64, of whole observations, which have all but the last at their front."""
-    first = np.asarray(observations)[:, : objectives - 1].astype(float)
+    """Weights (n, objectives), float64, of whole observations (n, entries), which have all but the last at their front.
+
+    Raises ValueError for another shape.
+    """
+    _check_number(objectives)
+    observations = np.asarray(observations)
+    if observations.ndim != 2 or observations.shape[1] < objectives - 1:
+        raise ValueError(
+            f"observations: shape (n, {objectives - 1} or more) is allowed, got {observations.shape}; "
+            "observation[None] makes one of one"
+        )
+    first = observations[:, : objectives - 1].astype(float)
     return np.column_stack([first, 1.0 - first.sum(axis=1)])
 
 
 def shown(weights: np.ndarray):
     """Weights as users meet them: of two objectives the weight of the first, a float; else a copy of all."""
     return float(weights[0]) if len(weights) == 2 else weights.copy()
+
+
+def _check_number(objectives) -> None:
+    if isinstance(objectives, bool) or not isinstance(objectives, (int, np.integer)) or objectives < 1:
+        raise ValueError(f"objectives: a positive integer is allowed, got {objectives!r}")
 
 
 def _is_number(value) -> bool:

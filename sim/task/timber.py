@@ -43,8 +43,12 @@ TIMBER_SCALE = 3000.0
 #: Of a year, where none is given.
 DISCOUNT_RATE = 0.03
 
-#: Columns that an environment with prices adds to the annual record.
-TIMBER_COLUMNS = ("timber_m3_ha", "net_revenue_eur_ha", "discounted_revenue_eur_ha")
+#: Columns that an environment with prices adds to the annual record: name -> (unit, meaning).
+TIMBER_COLUMNS = {
+    "timber_m3_ha": ("m3 ha-1", "timber cut, over bark"),
+    "net_revenue_eur_ha": ("EUR ha-1", "timber sold less harvesting, roads and planting"),
+    "discounted_revenue_eur_ha": ("EUR ha-1", "the same, worth so much at the episode's start"),
+}
 
 
 class Timber:
