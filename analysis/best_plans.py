@@ -23,7 +23,7 @@ import pandas as pd
 
 from analysis import experiments, metrics, paths, stored
 from cleanrl_style import protocol
-from cleanrl_style.protocol import arguments, fronts, provenance, reference, sites
+from cleanrl_style.protocol import arguments, fronts, reference, sites
 from cleanrl_style.protocol.evaluation import lanes_of
 from sim.task.fronts import FOLDER, play_plans
 
@@ -106,7 +106,8 @@ def search(returns_of, weights: np.ndarray, budget: int, seed: int) -> dict[tupl
 def study(task: protocol.Task, seed: int, budget: int, search_seed: int, played=None) -> pd.DataFrame:
     """The plans of a site that no other dominates, of the whole search or of its first half, and the constant ones.
 
-    Columns: seed, plan, found (its number in the search, from 1), kind (constant, front or half), returns.
+    Columns: seed, plan, found (its number in the search, from 1), returns, and whether it is of the front, of the front
+    of the first half, and constant.
     """
 
     def returns_of(plans):
@@ -178,10 +179,9 @@ def main(args: Args) -> None:
     plans_folder = args.folder or (Path("sim", "task", FOLDER) if ships else folder)
     paths.make_writable("--output-dir", folder)
     paths.make_writable("--folder", plans_folder)
-    physics = provenance.physics_name()
     for task in tasks:
         path = folder / f"{task.env_id}{'' if same_search else f'-{args.budget}-{args.seed}'}.csv"
-        settings = {"budget": args.budget, "seed": args.seed, "physics": physics}
+        settings = {"budget": args.budget, "seed": args.seed}
         tables = [stored.read(path, text=("plan",))] if stored.is_finished(path, settings) else []
         there = {seed for table in tables for seed in table.seed}
         todo = [seed for seed in seeds if seed not in there]

@@ -105,7 +105,7 @@ class Report:
         return self.all_steps - sum(command.steps - min(command.steps_done(), command.steps) for command in self.left)
 
     def ended(self, command: Command, failed: bool) -> None:
-        """One more is."""
+        """Count a command as ended."""
         self.left.remove(command)
         self.failed += failed
 
@@ -147,8 +147,8 @@ _STOPPED = threading.Event()
 
 
 def run(command: tuple[str, str, tuple[str, ...]]) -> tuple[int, str]:
-    """Run a command (folder, log, words) on a core of its own, again as often as it is killed; its exit status, and the
-    end of its output."""
+    """Run a command (folder, log, words) on a core of its own, again up to `RETRIES` times if it is killed; its exit
+    status, and the end of its output."""
     folder, log, words = command
     Path(log).parent.mkdir(parents=True, exist_ok=True)
     status = KILLED

@@ -24,7 +24,7 @@ from analysis.results import Results
 from analysis.studies import ensembles
 from analysis.tables import best_known, choices, main_results, runtime, single_sites
 from analysis.tables import learning_difficulty as difficulty_table
-from analysis.tables.common import has_numbers, over_seeds, score_text
+from analysis.tables.common import has_numbers, over_seeds, paper_name, score_text
 from analysis.tables.thaw_formulations import under_asymmetric
 from cleanrl_style import protocol
 from cleanrl_style.protocol import sites
@@ -173,9 +173,8 @@ def rows_of(results: Results, script: str, environment: str | None = None) -> li
     for (_, env_id, setting), replicates in found:
         parts = [flags(setting), "" if env_id in (GENERALIST, environment) else f"`{env_id}`"]
         title = ", ".join(filter(None, parts)) or "default"
-        is_papers = title == "default" and env_id == GENERALIST
-        papers = published.get(methods.paper_name(script), np.nan) if is_papers else np.nan
-        judged = [under_asymmetric(results, one) or one for one in replicates]
+        papers = published.get(paper_name(script, env_id, setting), np.nan)
+        judged = [under_asymmetric(results, one) for one in replicates]
         shown_rows.append((title, judged, papers, script in methods.TRAINED))
     return sorted(shown_rows, key=lambda row: row[0] != "default")
 
@@ -408,9 +407,10 @@ def on_other_sites(results: Results) -> str:
             ]
             cells.append("" if np.isnan(score) else f"{score:.0f}")
             for name in generalisation.RATIOS:
-                inside = row["split"] in (generalisation.TEST, generalisation.SEARCHED)
-                drop, low, high = (round(row[f"{name}_drop{end}"], 2) + 0.0 for end in ("", "_low", "_high"))
-                cells += [f"{row[name]:.2f}", "" if inside else f"{drop:.2f} [{low:.2f}, {high:.2f}]"]
+                drop, low, high = (
+                    round(row.get(f"{name}_drop{end}", np.nan), 2) + 0.0 for end in ("", "_low", "_high")
+                )
+                cells += [f"{row[name]:.2f}", "" if np.isnan(drop) else f"{drop:.2f} [{low:.2f}, {high:.2f}]"]
             rows.append(cells)
     if not rows:
         return "Not run yet: `python analysis/generalisation.py RUN`.\n"

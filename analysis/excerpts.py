@@ -14,7 +14,9 @@ from analysis.studies import boreal_map as region_map
 from analysis.studies import replanning, site_choice, site_regression
 from analysis.tables.common import markdown
 from analysis.validation import robustness_report
+from boreal_env import DEFAULT_YEARS
 from cleanrl_style import protocol
+from cleanrl_style.protocol.arguments import DEFAULT_STEPS
 
 VALIDATION = Path("docs/validation.md")
 TOWERS = ("SE-Svb", "US-Prr")
@@ -237,7 +239,7 @@ def gradient() -> str:
         f"{episodes(gradient_noise.MEAN)}; less that of the seven others of the same site, start and weather, as in "
         f"Group PPO, after {episodes(gradient_noise.SITE)}. Of thaw alone it is "
         f"{episodes(gradient_noise.NONE, 'thaw')} and {episodes(gradient_noise.SITE, 'thaw')}. "
-        "A training has 6,000 episodes.\n"
+        f"A training has {DEFAULT_STEPS['generalist'] // DEFAULT_YEARS:,} episodes.\n"
     )
 
 

@@ -12,7 +12,7 @@ from analysis import paths
 from analysis.methods import LEARNERS, METHODS, OUTSIDE, STRATEGIES
 from analysis.runs import SITE_SPECIFIC, setting
 from boreal_env import REGISTERED
-from cleanrl_style.protocol.arguments import DEFAULT_STEPS
+from cleanrl_style.protocol.arguments import DEFAULT_STEPS, FREE_ARGUMENTS
 from cleanrl_style.protocol.run_folder import as_text
 
 ROOT = Path(__file__).parents[1]
@@ -107,13 +107,10 @@ class Job:
             and all(
                 as_text(arguments.get(name)) == as_text(value)
                 for name, value in self.flags.items()
-                if name not in OUTPUT
+                if name not in FREE_ARGUMENTS
             )
             and changed <= {*self.flags, "env_id", "mode"}
         )
-
-
-OUTPUT = ("run_dir", "overwrite")  # arguments that no config.json has
 
 
 def trained(experiment: str, script: str, seed: int, **flags) -> Job:

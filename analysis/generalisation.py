@@ -117,8 +117,8 @@ def ratios(policies: Mapping[str, pd.DataFrame], best: pd.DataFrame) -> pd.DataF
 
 def summary(by_split: Mapping[str, pd.DataFrame], inside: str) -> pd.DataFrame:
     """Means over sites of `RATIOS` by policy and split, and the drop from inside to each other split, with 95 % t
-    intervals: paired by site, since a shift keeps the sites' seeds. A split of other sites has no drop. Sites without
-    a ratio do not count.
+    intervals: paired by site, since a shift keeps the sites' seeds. Neither `inside` itself nor a split of other sites
+    has one. Sites without a ratio do not count.
 
     by_split : split -> what `ratios` gave; inside : the split within the sampled range.
     """
@@ -133,7 +133,7 @@ def summary(by_split: Mapping[str, pd.DataFrame], inside: str) -> pd.DataFrame:
             row = {"policy": policy, "split": split, "sites": len(here)}
             for name in RATIOS:
                 row |= metrics.with_interval(name, here[name].dropna().to_numpy())
-                if paired:
+                if paired and split != inside:
                     row |= metrics.with_interval(f"{name}_drop", (there[name] - here[name]).dropna().to_numpy())
             rows.append(row)
     return pd.DataFrame(rows)
@@ -293,9 +293,8 @@ def report(table: pd.DataFrame, scores: Mapping[tuple, float]) -> None:
             score = scores.get((policy, row["split"]), np.nan)
             line = f"{row['split']:18s} {row['sites']:5d}" + (" " * 7 if np.isnan(score) else f"{score:7.0f}")
             for name in RATIOS:
-                drop, low, high = (row[f"{name}_drop{end}"] for end in ("", "_low", "_high"))
-                alone = row["split"] in (TEST, SEARCHED) or np.isnan(drop)
-                shown = "" if alone else f"{drop:+.2f} ({low:+.2f} .. {high:+.2f})"
+                drop, low, high = (row.get(f"{name}_drop{end}", np.nan) for end in ("", "_low", "_high"))
+                shown = "" if np.isnan(drop) else f"{drop:+.2f} ({low:+.2f} .. {high:+.2f})"
                 line += f"  {row[name]:5.2f}  {shown:21s}"
             print(line.rstrip())
 

@@ -208,8 +208,8 @@ def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plan
         method for method in rows if method != best and len(rows[method]) > 1 and not is_above(rows[best], rows[method])
     ]
 
-    best_blind = [method for method in rows if is_above(rows[method], deciduous)]
-    above = [method for method in rows if is_above(rows[method], planting)]
+    above_deciduous = [method for method in rows if is_above(rows[method], deciduous)]
+    above_planting = [method for method in rows if is_above(rows[method], planting)]
     below = [method for method in rows if is_below(rows[method], planting)]
     beside = {
         method: beside_100(*ends_of_score(scores[method], rows[method], best_plans))
@@ -232,8 +232,8 @@ def ranking(rows: dict, scores: dict, planting: list, deciduous: list, best_plan
         + (f", {named(even)} not told apart from 100" if even else "")
         + (f", {below_it}" if under else "")
         + (f", {named(alone)} of a single training, and not judged" if alone else "")
-        + f"; {named(best_blind)} above 100 deciduous trees a year, {named(above)} above +100 a year, half conifers; "
-        f"{named(below)} below that."
+        + f"; {named(above_deciduous)} above 100 deciduous trees a year, {named(above_planting)} above +100 a year, "
+        f"half conifers; {named(below)} below that."
     )
 
 
@@ -252,7 +252,9 @@ def of_longer_trainings(results, env_id: str, best_plans: list) -> str:
     if longer:
         more = listed([points(replicates, best_plans, best_plans) for replicates in longer.values()])
         text += " These intervals are of sites like these, which have other best plans and so another 100. Against the "
-        text += f"best plans of these 200 sites, taken as given, it gains {more} points more."
+        text += (
+            f"best plans of these {on_sites(best_plans).shape[1]} sites, taken as given, it gains {more} points more."
+        )
     return text
 
 

@@ -26,7 +26,7 @@ class Method:
     @property
     def trains(self) -> bool:
         """Whether it is trained."""
-        return self.kind in (CONDITIONED, FIXED_WEIGHT, POPULATION, BANDIT, OTHERS)
+        return self.kind not in (HEURISTIC, CONTROL)
 
     @property
     def path(self) -> str:
@@ -66,7 +66,7 @@ def scripts(*kinds: str) -> tuple[str, ...]:
 
 
 LEARNERS = scripts(CONDITIONED)
-TRAINED = scripts(CONDITIONED, BANDIT, FIXED_WEIGHT, OTHERS, POPULATION)
+TRAINED = tuple(method.script for method in ROWS if method.trains)
 STRATEGIES = scripts(HEURISTIC, CONTROL)
 OUTSIDE = scripts(OTHERS)
 

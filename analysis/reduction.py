@@ -139,6 +139,8 @@ def course(table: pd.DataFrame, column: str, statistic: str = "mean", parts: int
     """
     if BINS % parts:
         raise ValueError(f"parts of a training: a divisor of {BINS}, not {parts}")
+    if statistic not in ("mean", "std"):
+        raise ValueError(f"statistic {statistic!r}: mean or std is allowed")
     number, mean, deviation = (
         table[name].to_numpy(dtype=float, na_value=0.0).reshape(parts, -1)
         for name in ("episodes", f"{column}_mean", f"{column}_sd")

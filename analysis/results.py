@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import experiments, methods, metrics, paths, reduction, runs, stored
+from analysis import experiments, metrics, paths, reduction, runs, stored
 from analysis.studies.constant_plans import of_environment
 from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
@@ -230,25 +230,17 @@ class Results:
 
     def of(self, experiment: str, script: str, **flags) -> list[Replicate]:
         """Replicates of an experiment's row: the first of its jobs with these flags says which; none without a job."""
-        job = next(
-            (
-                job
-                for job in self.jobs
-                if job.experiment == experiment
-                and job.script == script
-                and all(job.flags.get(name) == value for name, value in flags.items())
-            ),
-            None,
-        )
-        return [] if job is None else self.rows[job.row]
+        jobs = self.jobs_of(experiment, script, **flags)
+        return self.rows[jobs[0].row] if jobs else []
 
-    def is_papers(self, key: tuple) -> bool:
-        """Whether a row is one of the paper's: no control, and not of the balanced environment."""
-        return key[2] == "default" or any(job.row == key for job in self.jobs if job.experiment in ("main", "fixed"))
-
-    def paper_name(self, key: tuple) -> str | None:
-        """What the paper's tables call the method of a row; None if the row is not one of theirs."""
-        return methods.paper_name(key[0]) if self.is_papers(key) and key[1] == experiments.GENERALIST else None
+    def jobs_of(self, experiment: str, script: str, **flags) -> list[experiments.Job]:
+        """Jobs of an experiment's script that have these flags, in order."""
+        return [
+            job
+            for job in self.jobs
+            if (job.experiment, job.script) == (experiment, script)
+            and all(job.flags.get(name) == value for name, value in flags.items())
+        ]
 
     def is_trained(self, key: tuple) -> bool:
         """Whether a row is of a script that trains, by its jobs or its runs."""
@@ -273,12 +265,11 @@ class Results:
 
     def first_job(self, experiment: str, script: str) -> experiments.Job:
         """The first job of an experiment's script."""
-        return next(job for job in self.jobs if job.experiment == experiment and job.script == script)
+        return self.jobs_of(experiment, script)[0]
 
     def study(self, name: str) -> pd.DataFrame | None:
         """The table of a study; None if it has not been made."""
         path = self.studies_dir / f"{name}.csv"
         if not path.exists():
             return None
-        stored.say_if_of_another_physics(path)
         return stored.read(path)

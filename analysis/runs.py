@@ -161,7 +161,7 @@ def check_kinds(values: dict, kinds: dict) -> None:
     """KeyError or TypeError for the first value that is not there, or of another kind."""
     for name, kind in kinds.items():
         if not isinstance(values[name], kind):
-            raise TypeError(f"{name} is {values[name]!r}")
+            raise TypeError(f"{name} is {values[name]!r}, not of {kind}")
 
 
 def read_run(folder: Path | str) -> Run:
@@ -197,15 +197,18 @@ def check_policy(evaluation: pd.DataFrame, policy: str, arguments: dict, objecti
     """ValueError if the episodes of a policy are not whole."""
     expected = len(arguments["eval_weights"]) * arguments["eval_episodes"]
     # on the fixed site every greedy episode is the first again, and one may stand for all
-    alike = policy == "greedy" and arguments["mode"] == "site-specific"
+    alike = policy == "greedy" and arguments["mode"] == SITE_SPECIFIC
     if len(evaluation) != expected and not (alike and len(evaluation) == len(arguments["eval_weights"])):
         raise ValueError(
             f"damaged: evaluation.csv has {len(evaluation)} episodes of the {policy} policy, not {expected}"
         )
     episodes = evaluation.groupby(fronts.weight_columns(objectives)).seed.nunique()
-    if len(episodes) != len(arguments["eval_weights"]) or episodes.nunique() != 1:
+    if len(episodes) != len(arguments["eval_weights"]):
+        raise ValueError(f"damaged: evaluation.csv has {len(episodes)} weights, not {len(arguments['eval_weights'])}")
+    if episodes.nunique() != 1:
+        least, most = episodes.min(), episodes.max()
         raise ValueError(
-            f"damaged: evaluation.csv lacks episodes of a weight, {len(arguments['eval_weights'])} of them"
+            f"damaged: evaluation.csv lacks episodes: {least} of the weight {episodes.idxmin()}, not {most}"
         )
     for what, columns in (
         ("weights", fronts.weight_columns(objectives)),

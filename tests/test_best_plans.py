@@ -56,7 +56,7 @@ def small(tmp_path, monkeypatch):
     """The command, of a small environment under an id of ours, and how it is called."""
     monkeypatch.setitem(boreal_env.REGISTERED, "quick-v0", quick_env.SMALL)
     monkeypatch.setattr(fronts, "shipped", lambda env_id: tmp_path / "shipped" / f"{env_id}.csv.gz")
-    monkeypatch.setattr(best_plans.provenance, "physics_name", lambda: "physics")
+    monkeypatch.setattr(stored.provenance, "physics_name", lambda: "physics")
     fronts.published_plans.cache_clear()
     given = {"env_id": ("quick-v0",), "sites": 2, "budget": 60, "folder": tmp_path / "shipped"}
     yield lambda folder, **more: best_plans.main(best_plans.Args(**given, output_dir=tmp_path / folder, **more))

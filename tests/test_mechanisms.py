@@ -63,7 +63,7 @@ def test_a_study_is_made_once(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(reference, "cache_folder", lambda: tmp_path / "cache" / "kernels")
     monkeypatch.setattr(reference, "shipped", lambda env_id: tmp_path / "none")
     monkeypatch.setattr(constant_plans.paths, "studies", lambda quick: tmp_path)
-    monkeypatch.setattr(constant_plans.provenance, "physics_name", lambda: "physics")
+    monkeypatch.setattr(stored.provenance, "physics_name", lambda: "physics")
     constant_plans.main(constant_plans.Args(quick=True))
     table = stored.read(tmp_path / "constant_plans.csv")
     environments = (*constant_plans.ENVIRONMENTS, "boreal-timber-v0")

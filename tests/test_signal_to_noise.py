@@ -120,7 +120,7 @@ def test_the_past_is_the_same_for_all_that_follows(tiny):
 @pytest.mark.slow
 def test_the_same_bytes_again(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(signal_to_noise, "QUICK", TINY)
-    monkeypatch.setattr(signal_to_noise, "physics_name", lambda: "physics")
+    monkeypatch.setattr(stored.provenance, "physics_name", lambda: "physics")
     names = ("signal_to_noise.csv", "signal_to_noise_years.csv")
     for folder in ("first", "second"):
         monkeypatch.setattr(signal_to_noise.paths, "studies", lambda quick, folder=folder: tmp_path / folder)

@@ -7,6 +7,8 @@ from analysis.figures.common import finish, no_data, panels
 from analysis.studies.open_loop import OBJECTIVES
 from analysis.studies.signal_to_noise import CONTRASTS, UNIFORM, WEIGHTINGS
 from analysis.tables.learning_difficulty import YEAR, variance_components
+from boreal_env import DEFAULT_YEARS
+from cleanrl_style.protocol.arguments import DEFAULT_STEPS
 
 SIZE = (7, 5.8)
 COURSE, COURSE_YEAR = "conifers, not deciduous", "0"  # both of its effects can be told from none
@@ -26,7 +28,7 @@ COMPONENTS = {
 }
 REST = "#DDDDDD"
 OF = {"carbon": ("#009E73", "o"), "thaw": ("#0072B2", "s")}
-TRAINING_EPISODES = 6000
+TRAINING_EPISODES = DEFAULT_STEPS["generalist"] // DEFAULT_YEARS
 
 
 def draw(figure, results) -> None:

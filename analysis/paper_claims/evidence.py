@@ -84,17 +84,11 @@ class Evidence:
         self.results, self._known = results, {}
         self.asked_for_eupg = False  # of the main table, which has it choose among valid actions
 
-    def job(self, experiment: str, script: str, budget: float = 1.0, **flags) -> Job:
-        """The first job of an experiment with these flags and this multiple of the main table's steps."""
+    def job(self, experiment: str, script: str, budget: float | None = None, **flags) -> Job:
+        """The first job of an experiment with these flags; budget : and this multiple of the main table's steps."""
         self.asked_for_eupg |= (experiment, script) == ("main", EUPG)
-        jobs = [
-            job
-            for job in self.results.jobs
-            if job.experiment == experiment
-            and job.script == script
-            and all(job.flags.get(name) == value for name, value in flags.items())
-        ]
-        if experiment == "controls":
+        jobs = self.results.jobs_of(experiment, script, **flags)
+        if budget is not None:
             steps = budget * self.results.first_job("main", script).steps
             jobs = [job for job in jobs if job.steps == steps]
         if not jobs:
@@ -171,7 +165,7 @@ class WithoutMasks(Evidence):
         except Missing:
             return False
 
-    def job(self, experiment: str, script: str, budget: float = 1.0, **flags) -> Job:
+    def job(self, experiment: str, script: str, budget: float | None = None, **flags) -> Job:
         """As Evidence.job; that of EUPG without masks for the main table's EUPG."""
         if (experiment, script) == ("main", EUPG):
             experiment, flags = "variants", {**flags, "masks": False}

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from analysis import paths, stored
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts, provenance, reference
+from cleanrl_style.protocol import fronts, reference
 from cleanrl_style.protocol.arguments import ask, ideal_point
 from cleanrl_style.protocol.utility import LINEAR, Chebyshev, Utility
 
@@ -105,7 +105,7 @@ def main(args: Args) -> None:
     front, choices = study(task, protocol.evaluation_seeds(task, 1))
     print(front.to_string(index=False, float_format="%.3f"))
     path = paths.studies() / "concave_front.csv"
-    made_by = {"env_id": args.env_id, "site_seed": args.site_seed, "physics": provenance.physics_name()}
+    made_by = {"env_id": args.env_id, "site_seed": args.site_seed}
     stored.write(path, front, made_by)
     with protocol.replacing(args.path) as file:
         title = f"{args.env_id}, site {args.site_seed}: constant plans"

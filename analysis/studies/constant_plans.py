@@ -19,12 +19,11 @@ import boreal_env
 import sim
 from analysis import experiments, metrics, paths, stored
 from cleanrl_style import protocol
-from cleanrl_style.protocol import provenance, score
+from cleanrl_style.protocol import score
 from cleanrl_style.protocol.reference import constant, reference_returns
 from sim.task.preference import check_weights
 
 ENVIRONMENTS = (experiments.GENERALIST, experiments.BALANCED)
-MORE = ("boreal-timber-v0", "boreal-four-v0", "boreal-warming-v0")  # measured on first use: their returns do not ship
 CONIFERS, DECIDUOUS = 24, 20  # actions that plant 100 trees of one kind
 
 
@@ -93,14 +92,13 @@ def main(args: Args) -> None:
     args = replace(args, eval_episodes=2) if args.quick else args
     folder = paths.studies(args.quick)
     sites = experiments.SITE_SEEDS[: 1 if args.quick else None]
-    environments = (*ENVIRONMENTS, *MORE[: 1 if args.quick else None])
-    physics = provenance.physics_name()
+    environments = (*ENVIRONMENTS, *experiments.OTHER_WORLDS[: 1 if args.quick else None])
     tables = {
         "constant_plans": (
-            {"episodes": args.eval_episodes, "environments": environments, "physics": physics},
+            {"episodes": args.eval_episodes, "environments": environments},
             lambda: pd.concat([study(env_id, args.eval_episodes) for env_id in environments]),
         ),
-        "constant_plans_of_sites": ({"sites": sites, "physics": physics}, lambda: study_of_sites(sites)),
+        "constant_plans_of_sites": ({"sites": sites}, lambda: study_of_sites(sites)),
     }
     for name, (settings, make) in tables.items():
         path = folder / f"{name}.csv"

@@ -18,7 +18,7 @@ import pandas as pd
 
 from analysis import experiments, metrics, paths, stored
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts, provenance, reference
+from cleanrl_style.protocol import fronts, reference
 
 SCRIPT = "ppo_group"
 TASKS = (experiments.GENERALIST, experiments.BALANCED)
@@ -80,7 +80,7 @@ def main(args: Args) -> None:
         commands = "python analysis/reproduce.py --only main balanced, python analysis/archive.py"
         protocol.fail(f"{archive / SCRIPT}: two policies or more of {lacking[0]} are needed ({commands})")
     digest = hashlib.sha256(b"".join(file.read_bytes() for files in there.values() for file in files.values()))
-    made_by = {"episodes": episodes, "physics": provenance.physics_name(), "policies": digest.hexdigest()[:16]}
+    made_by = {"episodes": episodes, "policies": digest.hexdigest()[:16]}
     if stored.is_finished(path(args.quick), made_by):
         print(f"{path(args.quick)} is finished")
         return

@@ -27,7 +27,6 @@ from analysis.studies.genes import Budget
 from analysis.studies.open_loop import GAINS, RETURNS, with_gains
 from cleanrl_style import protocol
 from cleanrl_style.flags import require
-from cleanrl_style.protocol import provenance
 
 YEARS = 50
 BLOCK_YEARS = 5
@@ -208,7 +207,7 @@ def main(args: Args) -> None:
     require("pymoo", extra="planners")
     most = 3 if args.without_mechanisms else open_loop.CANDIDATES
     if args.sites is not None and not 1 <= args.sites <= most:
-        sys.exit(f"fronts.py: --sites {args.sites}: 1 to {most} are allowed")
+        sys.exit(f"error: --sites {args.sites}: 1 to {most} are allowed")
     budget = QUICK if args.quick else SMALL if args.without_mechanisms else FULL
     folder, todo = folder_of(args), cases(args)
     settings = {
@@ -218,7 +217,6 @@ def main(args: Args) -> None:
         "block_years": BLOCK_YEARS,
         "columns": RETURNS + STAND,
         "weathers": "each site's own",
-        "physics": provenance.physics_name(),
     }
     paths.make_writable("--output-dir", folder)
     finished = {case: stored.is_finished(path_of(folder, *case), settings | {"case": case}) for case in todo}

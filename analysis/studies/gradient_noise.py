@@ -5,8 +5,8 @@
 An untrained policy of cleanrl_style/eupg_var_lambda.py plays sampled sites, several episodes on each with the same
 first stand, weather and dice, and the gradient of every episode is taken as the script takes it, then with baselines
 that the script does not have. The mean over n independent episodes is the gradient's signal plus noise whose square is
-1 / n of one episode's; at n = `episodes` both are equal. Leaves results/studies/gradient_noise.csv, one row a weight of
-the gradient, baseline and objective; docs/learning.md says how to read it.
+1 / n of one episode's; at n = `episodes` both are equal. Leaves results/studies/gradient_noise.csv, one row a utility,
+baseline and objective; docs/learning.md says how to read it.
 """
 
 import contextlib
@@ -25,7 +25,6 @@ from analysis.experiments import GENERALIST
 from analysis.studies import open_loop
 from cleanrl_style import eupg_var_lambda as eupg
 from cleanrl_style import protocol
-from cleanrl_style.protocol import provenance
 
 ENV_ID = GENERALIST
 AGENT_SEED = 1
@@ -212,7 +211,6 @@ def main(args: Args) -> None:
         **design._asdict(),
         "agent_seed": AGENT_SEED,
         "first_seed": FIRST_SEED,
-        "physics": provenance.physics_name(),
     }
     if stored.is_finished(path, settings):
         print(f"{path} is finished")

@@ -20,7 +20,6 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import provenance
 
 YEARS = 50
 STAND = {
@@ -173,7 +172,6 @@ def main(args: Args) -> None:
         "pairs": list(PAIRS),
         "off": OFF,
         "means": MEANS,
-        "physics": provenance.physics_name(),
     }
     if stored.is_finished(path, settings):
         print(f"{path} is finished")

@@ -17,7 +17,7 @@ import boreal_env
 from analysis import paths, stored
 from analysis.studies.measure_balance import FIRST_SEED
 from cleanrl_style import protocol
-from cleanrl_style.protocol import final_info, provenance, reference
+from cleanrl_style.protocol import final_info, reference
 from sim.task.timber import DISCOUNT_RATE, Timber, countries, timber_reward
 
 TASK = "boreal-four-v0"
@@ -67,7 +67,7 @@ def main(args: Args) -> None:
     """Play and write the table, unless it is there."""
     sites, years = (2, 3) if args.quick else (args.sites, 50)
     path = paths.studies(args.quick) / "objective_scales.csv"
-    settings = {"sites": sites, "years": years, "physics": provenance.physics_name()}  # prices and scales, too
+    settings = {"sites": sites, "years": years}  # prices and scales, too
     if not stored.is_finished(path, settings):
         stored.write(path, summarise(play(sites, years)), settings)
     print(f"{stored.read(path).round(2).to_string(index=False)}\n{path}")

@@ -22,7 +22,6 @@ from analysis import paths, stored
 from analysis.studies import open_loop, sensitivity
 from analysis.studies.sensitivity import DEFAULT, Variant
 from cleanrl_style import protocol
-from cleanrl_style.protocol import provenance
 from sim.stands import available_cores
 from sim.task.episodes import BALANCED_WORLD
 
@@ -94,9 +93,8 @@ def play_all(chosen: list[Variant], args: Args, played) -> pd.DataFrame:
 
 def settings(args: Args) -> dict:
     """What a table hangs on; another simulator or step makes it stale."""
-    physics = provenance.physics_name()
     worlds = ", ".join(WORLDS)
-    return {"worlds": worlds, "sites": args.sites, "years": args.years, "share": sensitivity.SHARE, "physics": physics}
+    return {"worlds": worlds, "sites": args.sites, "years": args.years, "share": sensitivity.SHARE}
 
 
 def path(quick: bool = False) -> Path:
@@ -115,7 +113,7 @@ def main(args: Args) -> None:
     if args.names:
         unknown = [name for name in args.names if name not in sim.CONSTANTS]
         if unknown:
-            sys.exit(f"planting_signs.py: --names {unknown[0]}: a name in sim/constants.csv is allowed")
+            sys.exit(f"error: --names {unknown[0]}: a name in sim/constants.csv is allowed")
         everything = [variant for variant in everything if variant.factor in ("default", *args.names)]
     made_by, table = settings(args), path(args.quick)
     if not args.names and stored.is_finished(table, made_by):

@@ -23,7 +23,7 @@ from analysis import paths, stored
 from analysis.studies import open_loop, signal_to_noise
 from analysis.studies.site_choice import ALL, PLANS, REPETITIONS, TASKS, YEARS
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts, provenance
+from cleanrl_style.protocol import fronts
 
 FIRST_FUTURE = 100_000  # weathers from here on are no other study's
 WAYS = ("all_sites", "once", "every_ten_years")
@@ -167,7 +167,7 @@ def main(args: Args) -> None:
             f"--sites {args.sites} --dice {args.dice} --futures {args.futures}: 2 sites, 1 of the others and more are "
             "allowed"
         )
-    made_by = {**design._asdict(), "physics": provenance.physics_name()}
+    made_by = design._asdict()
     for task in args.tasks:
         if stored.is_finished(path(task, args.quick), made_by):
             print(f"{path(task, args.quick)} is finished")

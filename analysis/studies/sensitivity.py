@@ -22,7 +22,6 @@ from analysis import stored
 from analysis.paths import make_writable
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import provenance
 from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.stands import available_cores
 
@@ -336,7 +335,7 @@ def main(args: Args) -> None:
         unknown = [name for name in args.names if name not in {variant.factor for variant in everything}]
         if unknown:
             sys.exit(
-                f"sensitivity.py: --names {unknown[0]}: a name in sim/constants.csv or sim/site_parameters.csv, "
+                f"error: --names {unknown[0]}: a name in sim/constants.csv or sim/site_parameters.csv, "
                 "or an alternative's, is allowed"
             )
         chosen = [variant for variant in everything if variant.factor in ("default", *args.names)]
@@ -353,7 +352,6 @@ def main(args: Args) -> None:
         "weathers": WEATHERS,
         "years": YEARS,
         "share": SHARE,
-        "physics": provenance.physics_name(),
     }
     groups: dict[str, list[Variant]] = {}
     for variant in everything:

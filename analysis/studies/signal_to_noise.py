@@ -31,7 +31,6 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol.provenance import physics_name
 from sim.draws import streams_of
 
 YEARS = 50
@@ -393,7 +392,6 @@ def main(args: Args) -> None:
         "contrasts": CONTRASTS,
         "weightings": WEIGHTINGS,
         "weathers": "each site's own",
-        "physics": physics_name(),
     }
     if all(stored.is_finished(path, settings) for path in files):
         print(f"{files[-1]} is finished")

@@ -21,7 +21,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts, provenance
+from cleanrl_style.protocol import fronts
 
 YEARS = 50
 SITES, DICE = 64, 8
@@ -121,7 +121,7 @@ def main(args: Args) -> None:
     sites, dice, years = (2, 2, 3) if args.quick else (args.sites, args.dice, YEARS)
     if sites < 2 or dice < 2:
         protocol.fail(f"--sites {sites} --dice {dice}: 2 or more of both are allowed")
-    made_by = {"sites": sites, "dice": dice, "years": years, "physics": provenance.physics_name()}
+    made_by = {"sites": sites, "dice": dice, "years": years}
     if stored.is_finished(path(args.quick), made_by):
         print(f"{path(args.quick)} is finished")
         return

@@ -20,7 +20,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop, site_choice
 from cleanrl_style import protocol
-from cleanrl_style.protocol import fronts, provenance
+from cleanrl_style.protocol import fronts
 
 SITES = 768
 FOLDS = 8
@@ -92,7 +92,7 @@ def main(args: Args) -> None:
     sites, years = (16, 2) if args.quick else (args.sites, site_choice.YEARS)
     if sites < 2 * FOLDS:
         protocol.fail(f"--sites {sites}: {2 * FOLDS} or more are allowed")
-    made_by = {"sites": sites, "years": years, "physics": provenance.physics_name()}
+    made_by = {"sites": sites, "years": years}
     if stored.is_finished(path(args.quick), made_by):
         print(f"{path(args.quick)} is finished")
         return

@@ -19,7 +19,6 @@ from analysis import results, stored
 from analysis.reduction import as_text
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import provenance
 
 YEARS = 50
 EACH = 60  # episodes of each kind and run
@@ -87,7 +86,6 @@ def main(args: Args) -> None:
         "seeds": seeds,
         "each": each,
         "years": years,
-        "physics": provenance.physics_name(),
         "samples": digest(curricula),
     }
     if stored.is_finished(path, settings):

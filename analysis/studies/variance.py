@@ -19,7 +19,6 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop
 from cleanrl_style import protocol
-from cleanrl_style.protocol import provenance
 
 YEARS = 50
 FACTORS = ("site", "weather", "policy")
@@ -191,10 +190,10 @@ def main(args: Args) -> None:
     if args.quick:
         args.sites, args.weathers = 4, 2
     if args.sites < 4 or args.weathers < 2:
-        sys.exit(f"variance.py: --sites >= 4 and --weathers >= 2 are allowed, not {args.sites}, {args.weathers}")
+        sys.exit(f"error: --sites >= 4 and --weathers >= 2 are allowed, not {args.sites}, {args.weathers}")
     folder = args.output_dir or paths.results(args.quick) / "variance"
     paths.make_writable("--output-dir", folder)
-    settings = asdict(args) | {"output_dir": None, "physics": provenance.physics_name()}
+    settings = asdict(args) | {"output_dir": None}
     site_seeds = [open_loop.FIRST_SITE_SEED + k for k in range(args.sites)]
     rewards = play(site_seeds, args.weathers)
     returns = rewards.sum(axis=3)

@@ -21,7 +21,6 @@ from analysis import make_scenarios, metrics, paths, stored
 from analysis.studies import open_loop
 from analysis.tables.common import markdown
 from cleanrl_style import protocol
-from cleanrl_style.protocol import provenance
 from sim.scenario import FIRST_YEAR, check_scenario
 from sim.task.episodes import BALANCED_WORLD
 
@@ -438,7 +437,7 @@ def main(args: Args) -> None:
     if args.sites == Args.sites and not PAGE.parent.is_dir():
         protocol.fail(f"{PAGE}: no such folder here; this is run in the project's folder")
     folder = paths.studies(args.quick)
-    made_by = {"sites": args.sites, "years": years, "plans": plans, "physics": provenance.physics_name()}
+    made_by = {"sites": args.sites, "years": years, "plans": plans}
     tables = [folder / "warming.csv", folder / "warming_years.csv"]
     if all(stored.is_finished(path, made_by) for path in tables):
         print(f"{tables[0]} is finished")

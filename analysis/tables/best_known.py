@@ -115,8 +115,6 @@ def make(results) -> pd.DataFrame:
     for env_id in ENVIRONMENTS:
         path = results.studies_dir / "best_plans" / f"{env_id}.csv"
         if path.exists():
-            stored.say_if_of_another_physics(path)
             rows += rows_of(results, env_id, stored.read(path, text=("plan",)))
     ends = [f"{name}{end}" for name in list(COLUMNS)[6:] for end in ("_low", "_high")]
-    rows = rows or [{"method": "not run yet", "seeds": 0}]
     return pd.DataFrame(rows).reindex(columns=[*COLUMNS, *ends])

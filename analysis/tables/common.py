@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis import metrics
+from analysis import experiments, methods, metrics
 from cleanrl_style import protocol
 from cleanrl_style.protocol import FLOAT_FORMAT
 
@@ -95,3 +95,13 @@ def write_table(stem: Path, table: pd.DataFrame, text: pd.DataFrame) -> None:
         file.write(markdown(text.columns, text.to_numpy()).encode())
     with protocol.replacing(stem.with_suffix(".tex")) as file:
         file.write(text.to_latex(index=False, escape=True, column_format="l" * text.shape[1]).encode())
+
+
+def paper_name(script: str, env_id: str, setting: str) -> str | None:
+    """What the paper's tables call a row's method; None if they do not have it.
+
+    They have methods in the paper's environment, as they are by default. That its PPOs choose among valid actions alone
+    the paper says, of other methods it does not: a number of theirs stands beside both readings.
+    """
+    its = env_id == experiments.GENERALIST and methods.flags(setting) in ("", "--no-masks")
+    return methods.paper_name(script) if its else None

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from analysis import metrics
-from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, paper_name, row_of
 
 MADE_BY = "python analysis/reproduce.py --only main"
 COLUMNS = ROW_COLUMNS | {
@@ -47,7 +47,7 @@ def make(results) -> pd.DataFrame:
     rows = []
     for key, replicates in results.rows_of_two_objectives().items():
         tables = [by_weight(one) for one in replicates]
-        name = results.paper_name(key)
+        name = paper_name(*key)
         theirs = published.loc[name] if (name, 0.0) in published.index else published.iloc[:0]
         ours = pd.concat(tables) if tables else pd.DataFrame()
         for weight in sorted({*ours.index, *(theirs.index if tables else ())}):

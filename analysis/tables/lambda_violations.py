@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import metrics
-from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, paper_name, row_of
 
 MADE_BY = "python analysis/reproduce.py --only main"
 COLUMNS = ROW_COLUMNS | {
@@ -38,7 +38,7 @@ def violations(one) -> dict:
 
 
 def make(results) -> pd.DataFrame:
-    """One row per method that is conditioned on the preference, environment and setting."""
+    """One row per trained method, environment and setting."""
     published = paper("monotonicity_violations", index_col="method").violations_percent
     details = paper("detailed_objectives").groupby("method")[["carbon_mean", "thaw_mean"]]
     details = details.apply(metrics.violations_percent)
@@ -51,7 +51,7 @@ def make(results) -> pd.DataFrame:
         table = pd.DataFrame([violations(one) for one in replicates], columns=names).astype(float)
         row = row_of(key, len(table)) | over_seeds(table.drop(columns="pairs")) | {"pairs": table.pairs.mean()}
         row["responding"] = int(table.pairs.notna().sum())  # to the preference at all; the percentages are of these
-        name = results.paper_name(key)
+        name = paper_name(*key)
         if name in published.index:
             row["paper_violations_percent"] = published[name]
             row["paper_detail_violations_percent"] = details.get(name, np.nan)

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from analysis.methods import LEARNERS, STRATEGIES
-from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, paper_name, row_of
 
 MADE_BY = "python analysis/reproduce.py --only main"
 YEARS = {
@@ -52,7 +52,7 @@ def make(results) -> pd.DataFrame:
     for key, replicates in results.of_main_and_others((*LEARNERS, *STRATEGIES)).items():
         table = pd.DataFrame([numbers(one) for one in replicates], columns=columns).astype(float)
         row = row_of(key, len(table)) | over_seeds(table)
-        if results.paper_name(key) in published.index:
-            row |= published.loc[results.paper_name(key)].to_dict()
+        if paper_name(*key) in published.index:
+            row |= published.loc[paper_name(*key)].to_dict()
         rows.append(row)
     return pd.DataFrame(rows)

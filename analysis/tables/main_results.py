@@ -11,7 +11,7 @@ import pandas as pd
 
 from analysis import metrics
 from analysis.studies.constant_plans import CONIFERS, DECIDUOUS, ENVIRONMENTS, as_evaluation
-from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, row_of
+from analysis.tables.common import ROW_COLUMNS, over_seeds, paper, paper_name, row_of
 from cleanrl_style import protocol
 from cleanrl_style.protocol.fronts import evaluation_weights
 
@@ -92,7 +92,7 @@ def run_metrics(evaluation: pd.DataFrame, gains: pd.DataFrame | None) -> dict:
 
 def scores(replicates: list) -> dict:
     """Score of both policies and gain of the primary one, each with its interval over seeds and sites together."""
-    row = {name: np.nan for name in ("score_greedy", "score_sampled")}
+    row = {name: np.nan for name in ("gain_scalarized", "score_greedy", "score_sampled")}
     known = [one for one in replicates if one.gains is not None]
     if not known or len(known) < len(replicates):
         return row
@@ -136,7 +136,7 @@ def row_of_runs(key: tuple, replicates: list, objectives=("carbon", "thaw")) -> 
     responses = table.columns[table.columns.str.endswith(("_change", "_slope"))]
     if table[responses].notna().any(axis=None):  # what does the same at every weight is one that does not respond
         table[responses] = table[responses].fillna(0.0)
-    row = row_of(key, len(table)) | over_seeds(table.drop(columns="sd_over_episodes"))
+    row = row_of(key, len(table)) | over_seeds(table.drop(columns=["gain_scalarized", "sd_over_episodes"]))
     return row | scores(replicates) | {"sd_over_episodes": table.sd_over_episodes.mean()}
 
 
@@ -182,7 +182,7 @@ def make(results) -> pd.DataFrame:
     published, rows = paper_rows(), []
     for key in sorted(replicates, key=lambda key: ENVIRONMENTS.index(key[1])):
         row = row_of_runs(key, replicates[key])
-        if results.paper_name(key) in published.index:
-            row |= published.loc[results.paper_name(key)].to_dict()
+        if paper_name(*key) in published.index:
+            row |= published.loc[paper_name(*key)].to_dict()
         rows.append(row)
     return pd.DataFrame(rows)

@@ -9,6 +9,7 @@ from analysis import metrics
 from analysis.tables.common import over_seeds, paper
 from analysis.tables.main_results import front_metrics
 from cleanrl_style import protocol
+from cleanrl_style.protocol.evaluation import ASYMMETRIC
 
 MADE_BY = "python analysis/reproduce.py --only main thaw"
 FORMULATIONS = {"asymmetric": "main", "contrast": "thaw", "raw_degree_days": "thaw"}  # -> experiment
@@ -33,25 +34,17 @@ COLUMNS = {
     "asymmetric_thaw": "thaw, asymmetric reward",
     "asymmetric_gain": "gain, asymmetric reward",
 }
-# Column of the evaluation of a run trained on another formulation: its thaw return under the asymmetric reward.
-ASYMMETRIC = "asymmetric_thaw_return"
 SPREADS = ["scalarized_sd", "carbon_sd", "thaw_sd"]
 
 
 def replicates_of(results, formulation: str) -> list:
     """Runs of gated PPO trained on a formulation."""
     flags = {} if formulation == "asymmetric" else {"thaw_formulation": formulation}
-    if not any(
-        job.flags.get("thaw_formulation", "asymmetric") == formulation
-        for job in results.jobs
-        if job.script == "ppo_gated"
-    ):
-        return []  # `reproduce.py --quick` trains on one formulation alone
     return results.of(FORMULATIONS[formulation], "ppo_gated", **flags)
 
 
 def under_asymmetric(results, one):
-    """A replicate whose episodes are judged by the asymmetric reward; None if its evaluation lacks that."""
+    """A replicate whose episodes are judged by the asymmetric reward; ValueError if its evaluation lacks that."""
     arguments = one.runs[0].arguments
     if arguments["thaw_formulation"] == "asymmetric":
         return one
@@ -59,7 +52,7 @@ def under_asymmetric(results, one):
     for policy in protocol.POLICIES:
         table = pd.concat([run.of_policy(policy) for run in one.runs], ignore_index=True)
         if ASYMMETRIC not in table:
-            return None
+            raise ValueError(f"{one.runs[0].folder}: evaluation.csv lacks the column {ASYMMETRIC}")
         table = table.assign(thaw_return=table[ASYMMETRIC]).drop(columns=ASYMMETRIC)
         scalarized = metrics.scalarize(metrics.returns_of(table), metrics.weights_of(table))
         by_policy[policy] = table.assign(scalarized_return=scalarized)
@@ -79,10 +72,8 @@ def run_numbers(one) -> dict:
 
 
 def asymmetric_numbers(results, one) -> dict:
-    """Its numbers under the asymmetric reward, if they are known."""
+    """Its numbers under the asymmetric reward."""
     judged = under_asymmetric(results, one)
-    if judged is None:
-        return {}
     row = {
         "asymmetric_scalarized": metrics.mean_scalarized(judged.evaluation),
         "asymmetric_thaw": judged.evaluation.thaw_return.mean(),
