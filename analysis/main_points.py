@@ -252,9 +252,7 @@ def of_longer_trainings(results, env_id: str, best_plans: list) -> str:
     if longer:
         more = listed([points(replicates, best_plans, best_plans) for replicates in longer.values()])
         text += " These intervals are of sites like these, which have other best plans and so another 100. Against the "
-        text += (
-            f"best plans of these {on_sites(best_plans).shape[1]} sites, taken as given, it gains {more} points more."
-        )
+        text += f"best plans of these very sites, taken as given, it gains {more} points more."
     return text
 
 

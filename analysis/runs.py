@@ -161,7 +161,7 @@ def check_kinds(values: dict, kinds: dict) -> None:
     """KeyError or TypeError for the first value that is not there, or of another kind."""
     for name, kind in kinds.items():
         if not isinstance(values[name], kind):
-            raise TypeError(f"{name} is {values[name]!r}, not of {kind}")
+            raise TypeError(f"{name} is {values[name]!r}, not of {getattr(kind, '__name__', kind)}")
 
 
 def read_run(folder: Path | str) -> Run:

@@ -326,7 +326,7 @@ def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
         ("text-for-numbers", "damaged: episodes.csv, line 2: global_step is 'x', not a number"),
         ("broken-years", "damaged: evaluation_years.csv"),
         ("half-a-line", "damaged: timing.csv does not end with a newline"),
-        ("no-settings", "damaged: config.json (TypeError('not_default is []'))"),
+        ("no-settings", "damaged: config.json (TypeError('not_default is [], not of dict'))"),
         ("zz-first", "the same run as"),
     ]:
         assert sum(str(runs / name) + ":" in line and reason in line for line in lines) == 1, name
@@ -734,9 +734,8 @@ def test_the_committed_tables_are_of_the_committed_runs():
 
 
 def test_a_study_of_another_simulator_is_named_once(tmp_path, capsys):
-    for name, physics in (("mine", physics_name()), ("other", "another"), ("unsaid", None)):
-        settings = {"physics": physics} if physics else {}
-        stored.write(tmp_path / f"{name}.csv", pd.DataFrame({"value": [1.0]}), settings)
+    for name, made_by in (("mine", stored.with_physics({})), ("other", {"physics": "another"}), ("unsaid", {})):
+        (tmp_path / f"{name}.csv").write_text(f"# {json.dumps(made_by)}\nvalue\n1.0\n")
         for _ in range(2):
             assert Results((), experiments.jobs(), tmp_path).study(name).value.tolist() == [1.0]
     assert capsys.readouterr().err.splitlines() == [
