@@ -80,14 +80,15 @@ means over training seeds, of the policy that the runs name primary, the greedy 
 weathers, with 95 % intervals: bootstrap and t, each end of the one that reaches further. Differences are paired by seed
 between runs of one script, and between Curriculum and PPO Gated, which train on the same episodes; between others each
 side's seeds are its own. Returns are sums over 50 years; gains are returns less those of zero change on the same
-episodes. What is over sites or episodes is a mean with its 95 % t interval, a correlation with Fisher's, a share with
-Wilson's, and has no training in it. Protection is less heat through the boundary at 12 m, as the reward has it; where
-pairs of stands are compared the active layer stands beside it. The paper's boundary is the top of the permafrost table:
-claims on how much the site decides, on scatter between episodes and on warming fluxes hang on that depth, too. The
-paper trained a single agent for all sites; its ± is over episodes. Trained methods in our tables choose among valid
-actions. The paper names masks for its PPOs alone, so claims on Variable λ EUPG are judged, too, by one that chooses
-among all actions and pays for what cannot be carried out, where that has been run (its rows stand where they differ);
-those on Fixed λ EUPG are not.
+episodes. What is over sites or episodes is a mean with its 95 % t interval, a share with Wilson's, a component of
+variance with a bootstrap over sites, and has no training in it; a correlation is a mean over training seeds, with
+Fisher's interval over sites. Protection is less heat through the boundary at 12 m, as the reward has it; where pairs of
+stands are compared the active layer stands beside it. The paper's boundary is the top of the permafrost table: claims
+on how much the site decides, on scatter between episodes and on warming fluxes hang on that depth, too. The paper
+trained a single agent for all sites; its ± is over episodes. Trained methods in our tables choose among valid actions.
+The paper names masks for its PPOs alone, so claims on Variable λ EUPG are judged, too, by one that chooses among all
+actions and pays for what cannot be carried out, where that has been run (its rows stand where they differ); those on
+Fixed λ EUPG are not.
 
 **Kinds and votes.** Claims of the paper are sorted by what they are about, and every fact has one vote: a claim that
 states another's fact once more names it and has none. A level, a return or a density of another simulator, is set
@@ -97,13 +98,14 @@ beside ours and never failed.
 does not if the interval has the other sign or, whatever its sign, no effect worth the name in it: of a return a quarter
 of what the best constant plans gain over doing nothing (25 points of score), of how far a preference is followed a
 quarter of what the best plans' return changes by from weight 0 to 1, of what has the paper's units a quarter of its
-effect. That is much: planting 100 stems a year blindly and the best constant plan are less far apart. Beyond that signs
-are judged, not sizes: how large the paper's difference is stands beside ours. A value or a range is met if all of our
-interval lies in it, give or take a tenth, and not if all of it lies outside. A cost is met if ours is no larger. A
-claim of several parts does not hold if one of them does not, and one that can be read in two ways is undecided where
-the two part. A bootstrap over few seeds is too narrow (of normal values it covers nine tenths with five seeds instead
-of 95 %), so verdicts ask for five, and for the t interval of the seeds' mean to agree. Dozens of intervals are judged
-one by one, uncorrected. Those over training seeds hold for these evaluation sites: other sites are another matter.
+effect, of a ratio of spreads a tenth, of a growing season a day. That is much: planting 100 stems a year blindly and
+the best constant plan are less far apart. Beyond that signs are judged, not sizes: how large the paper's difference is
+stands beside ours. A value or a range is met if all of our interval lies in it, give or take a tenth, and not if all of
+it lies outside. A cost is met if ours is no larger. A claim of several parts does not hold if one of them does not, and
+one that can be read in two ways is undecided where the two part. A bootstrap over few seeds is too narrow (of normal
+values it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five, and for the t interval of the
+seeds' mean to agree. Dozens of intervals are judged one by one, uncorrected. Those over training seeds hold for these
+evaluation sites: other sites are another matter.
 """
 
 

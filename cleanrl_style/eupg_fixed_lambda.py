@@ -55,7 +55,7 @@ class Args:
 
     # Evaluation and output
     eval_episodes: int = 200
-    """evaluation episodes, each on a site of its own"""
+    """evaluation episodes, each on another site (of one site: in another weather)"""
     run_dir: str | None = None
     """folder of the run (None: runs/<script>/<env-id>[-<what is not default>]/seed<seed>)"""
     overwrite: bool = False

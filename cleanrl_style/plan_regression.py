@@ -39,7 +39,7 @@ class Args:
 
     # Evaluation and output
     eval_episodes: int = 200
-    """evaluation episodes per weight, each on a site of its own"""
+    """evaluation episodes per weight, each on another site (of one site: in another weather)"""
     eval_weights: tuple[float, ...] | None = None
     """carbon weights of the evaluation (None: 0 0.25 .. 1); of three and more objectives, as many numbers a weight"""
     run_dir: str | None = None

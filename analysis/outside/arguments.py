@@ -21,7 +21,7 @@ class Args:
     total_timesteps: int | None = None
     """steps of training (None: 300000, in site-specific mode 100000)"""
     eval_episodes: int = 200
-    """evaluation episodes per weight, each on a site of its own"""
+    """evaluation episodes per weight, each on another site (of one site: in another weather)"""
     eval_weights: tuple[float, ...] | None = None
     """carbon weights of the evaluation (None: 0 0.25 .. 1); of three and more objectives, as many numbers a weight"""
     run_dir: str | None = None

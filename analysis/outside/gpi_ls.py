@@ -2,8 +2,9 @@
 
     python analysis/outside/gpi_ls.py --seed 1 --env-id boreal-balanced-v0
 
-Settings are those of the library's example of discrete actions (minecart), but gamma. It chooses weights by episodes of
-its own evaluation, which count in no budget; cost.csv says how many steps they were.
+Settings are those of the library's example of discrete actions (minecart), but gamma, one update a step, prioritised
+replay and a buffer of the whole training. It chooses weights by episodes of its own evaluation, which count in no
+budget; cost.csv says how many steps they were.
 """
 
 from dataclasses import dataclass

@@ -2,8 +2,9 @@
 
     python analysis/outside/morld.py --seed 1 --env-id boreal-balanced-v0
 
-Settings are those of the library's example of discrete actions (lunar lander). At a weight the policy is the best of
-its archive by its own evaluation, which counts in no budget; cost.csv says how many steps it was.
+Settings are those of the library's example of discrete actions (lunar lander), but fewer episodes an
+evaluation. At a weight the policy is the best of its archive by its own evaluation, of discounted returns, which counts
+in no budget; cost.csv says how many steps it was.
 """
 
 from dataclasses import dataclass

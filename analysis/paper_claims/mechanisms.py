@@ -8,7 +8,6 @@ from analysis.paper_claims.claim import (
     LEAST,
     LEVEL,
     QUARTER,
-    UNDECIDED,
     UNTESTABLE,
     Finding,
     Missing,
@@ -20,6 +19,7 @@ from analysis.paper_claims.claim import (
     below,
     claim,
     finding,
+    read_twice,
     share,
     short,
     within,
@@ -218,10 +218,7 @@ def correlation_claim(variable: str, statement: str, why: str):
         by_leaves, by_warmth = (
             finding(rows, with_sign(r, least=QUARTER * abs(papers[name]), what="r")) for r in (ours, warm)
         )
-        if by_leaves.verdict == by_warmth.verdict:
-            return by_leaves
-        told = f"By the season of leaves: {by_leaves.verdict}; by warm days: {by_warmth.verdict}."
-        return Finding(rows, UNDECIDED, by_leaves.rule, remark=told)
+        return read_twice(by_leaves, by_warmth, ("By the season of leaves", "By warm days"))
 
     return correlated
 

@@ -316,8 +316,8 @@ By `|zero_carbon| + |zero_thaw|`.
 
 ## All site parameters
 
-`bend`: how far the middle of the range is from the straight line between its ends, as a share of the effect, for the
-measure that bends most.
+`bend`: how far the middle of the range is from the straight line between its ends, the largest of all measures, as a
+share of the largest effect of all.
 
 {markdown(moved[site], ("bend",))}
 

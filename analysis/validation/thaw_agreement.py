@@ -51,6 +51,7 @@ def text(worlds: dict[str, np.ndarray], plans: list[str]) -> str:
         for first, second in combinations(MEASURES, 2)
     ]
     return f"""Thaw as the field measures it is in the annual record. How often two measures, over all years of an
-episode, differ in the sign of what a plan does ({", ".join(plans[1:])}, each less {plans[0]}; all sites):
+episode, differ in the sign of what a plan does ({", ".join(plans[1:])}, each less {plans[0]}; of the effects that both
+see):
 
 {document.table(["measures", *found], rows, left=1)}"""
