@@ -109,10 +109,10 @@ def saved_run(folder, width=105):
     torch.manual_seed(4)
     agent = ppo_gated.Agent(SimpleNamespace(single_observation_space=space))
     folder.mkdir(parents=True)
-    saved = {"agent": agent.state_dict(), "arguments": {"num_values": 1}, "observation_shape": (width,)}
+    run = {"script": "ppo_gated", "arguments": {"env_id": "boreal-site-specific-v0"}}
+    saved = {"agent": agent.state_dict(), "arguments": {"num_values": 1}, "observation_shape": (width,), "run": run}
     torch.save(saved, folder / "policy.pt")
-    config = {"script": "ppo_gated", "arguments": {"env_id": "boreal-site-specific-v0"}}
-    (folder / "config.json").write_text(json.dumps(config))
+    (folder / "config.json").write_text(json.dumps(run))
     return str(folder)
 
 

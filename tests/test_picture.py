@@ -117,10 +117,10 @@ def test_an_animation_has_all_frames_and_colours(tmp_path):
 
 def test_the_policy_of_a_run_is_played(tmp_path):
     agent = ppo_curriculum.Agent(gym.make_vec("boreal-site-specific-v0", num_envs=1))
-    saved = {"agent": agent.state_dict(), "arguments": {"num_values": 1}, "observation_shape": (43,)}
+    run = {"script": "ppo_curriculum", "arguments": {"env_id": "boreal-site-specific-v0"}}
+    saved = {"agent": agent.state_dict(), "arguments": {"num_values": 1}, "observation_shape": (43,), "run": run}
     torch.save(saved, tmp_path / "policy.pt")
-    config = {"script": "ppo_curriculum", "arguments": {"env_id": "boreal-site-specific-v0"}}
-    (tmp_path / "config.json").write_text(json.dumps(config))
+    (tmp_path / "config.json").write_text(json.dumps(run))
     policy = load_policy(tmp_path)
     assert policy.env_id == "boreal-site-specific-v0" and not policy.looks_back
     masks = np.zeros((2, 25), bool)
