@@ -141,7 +141,9 @@ def test_a_slurm_array_is_its_parts(tmp_path):
         words = [shutil.which("bash"), ROOT / "analysis" / "slurm_array.sh", "a script.py", "--seeds", "1-10"]
         return subprocess.run(words, env={**os.environ, **array}, capture_output=True, text=True)
 
-    assert answer(2, 11, 10).stdout == "analysis/sweep.py a script.py --seeds 1-10 --address none --part 3/10\n"
+    assert answer(2, 11, 10).stdout == (
+        "analysis/sweep.py --workers 1 a script.py --seeds 1-10 --address none --part 3/10\n"
+    )
     with_gaps = answer(4, 7, 2)
     assert with_gaps.returncode == 1 and with_gaps.stderr.startswith("error: --array without gaps is allowed")
 

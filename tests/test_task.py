@@ -24,7 +24,7 @@ gym.register("contrast-v0", entry_point="boreal_env:BorealEnv", kwargs={"thaw_fo
 def test_a_time_limit_has_no_state_to_go_on_from():
     """It counts the steps of an episode beside the environment: a run that was stopped starts over."""
     limited, free = (gym.make("short-v0", max_episode_steps=steps) for steps in (2, None))
-    blocks = training_envs.split(1, 1)
+    blocks = training_envs.split_among_workers(1, 1)
     states = [training_envs.InWorker(env, 0, blocks[0]).get_state() for env in (limited, free)]
     assert states[0] is None and states[1] is not None
 
