@@ -171,7 +171,7 @@ def compute_gae(rewards, values, dones, next_value, next_done, gamma, gae_lambda
 
 
 def weigh_advantages(advantages, weights, trained):
-    """Advantages (n,) of m objectives' (n, m), each by its mean and deviation over the positions `trained`."""
+    """Advantages (n,) of m objectives' (n, m), each normalised over the positions `trained`."""
     mean = advantages[trained].mean(dim=0)
     # numpy's root: the last bit of torch's hangs on the processor
     std = torch.from_numpy(np.sqrt((advantages[trained] - mean).square().mean(dim=0).numpy()))

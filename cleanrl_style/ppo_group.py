@@ -93,7 +93,7 @@ def layer_init(layer, std=np.sqrt(2), bias_const=0.0):
 
 
 class Agent(nn.Module):
-    """A gate chooses planting (actions 15-24) or not (0-14); each has a head. Each objective has all three anew.
+    """A gate chooses planting (actions 15-24) or not (0-14), each by logits of its own; so for each objective.
 
     The preference weighs the objectives' logits, as it does their advantages. num_logits : one for each, or 1 for all.
     """
@@ -248,7 +248,7 @@ if __name__ == "__main__":
     if task.fixes_preference:
         protocol.fail(f"--env-id {args.env_id}: it has a fixed_preference, and training is over all of them")
     if args.num_envs == 1 and 1 in (args.rollout_steps, args.total_timesteps % args.rollout_steps):
-        protocol.fail(f"--rollout-steps {args.rollout_steps}: it leaves a rollout of 1 step; 2 or more are allowed")
+        protocol.fail(f"--num-envs 1, --rollout-steps {args.rollout_steps}: a rollout of 1 step, 2 are the least")
     episode_columns = task.episode_columns
     gae_lambda = args.gae_lambda or [1.0 if name == "thaw" else 0.95 for name in task.objectives]
     if len(gae_lambda) not in (1, task.num_objectives):

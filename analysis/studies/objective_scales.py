@@ -67,7 +67,7 @@ def main(args: Args) -> None:
     """Play and write the table, unless it is there."""
     sites, years = (2, 3) if args.quick else (args.sites, 50)
     path = paths.studies(args.quick) / "objective_scales.csv"
-    settings = {"sites": sites, "years": years}  # prices and scales, too
+    settings = {"sites": sites, "years": years}
     if not stored.is_finished(path, settings):
         stored.write(path, summarise(play(sites, years)), settings)
     print(f"{stored.read(path).round(2).to_string(index=False)}\n{path}")

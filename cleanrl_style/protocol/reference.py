@@ -100,7 +100,7 @@ def reference_returns(task: Task, seeds: list[int]) -> pd.DataFrame | None:
     """Returns of every plan on the episodes with these seeds: plan, seed, a return for each objective.
 
     plan : the action of a constant plan, or a fixed strategy's name, which the tables that ship have besides.
-        None where the environment is not ours: what doing nothing is there is not known.
+    None where the environment is not ours: what doing nothing is there is not known.
     """
     if not task.boreal:
         return None

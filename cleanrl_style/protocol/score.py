@@ -44,7 +44,7 @@ def gains(evaluation: pd.DataFrame, nothing: pd.DataFrame, utility: Utility = LI
     missing = sorted(set(evaluation.seed) - set(reference.index))
     if missing:
         raise ValueError(
-            f"zero change was not evaluated on the episode with seed {missing[0]}, one of {len(missing)}; "
+            f"zero change was not evaluated on {len(missing)} of the episodes, the first with seed {missing[0]}; "
             "evaluate both with the same --eval-episodes"
         )
     difference = evaluation.copy()

@@ -22,7 +22,7 @@ WATCHING = (OrderEnforcing, PassiveEnvChecker)  # wrappers that only watch the c
 
 
 class InWorker(gym.Wrapper):
-    """A worker process's environment, or its several, that can be given a preference and a state to continue from.
+    """A worker process's environment or environments, which can be given a preference and a state to continue from.
 
     An error ends the process, after its traceback: passing it on through gymnasium would lose the traceback, or
     hang if the error cannot be pickled. Numbers that are not finite are an error.

@@ -27,7 +27,7 @@ class WorkerEnvs(gym.Env):
     """The environments of one worker, in lockstep on one thread.
 
     Observations, rewards, terminations and truncations have a row for each, and so has the action. AsyncVectorEnv wants
-    one shape of all workers: one with fewer than `rows`, which the largest has, has zeros below.
+    one shape of all workers: with fewer environments than `rows`, the most that one has, they end in zeros.
     """
 
     def __init__(self, env: BorealEnv, indices: range, rows: int):
