@@ -5,13 +5,15 @@
 #     docker run --rm borearl pytest                                   # all tests but the slow ones
 FROM python:3.11-slim
 
-# some tests compare commits
+# tests make repositories of their own
 RUN apt-get update && apt-get install -y --no-install-recommends git && rm -rf /var/lib/apt/lists/*
 
 WORKDIR /borearl
-COPY . .
-# torch for processors: a tenth of the download; alone, since its index has not all versions of the rest
+# torch for processors: a tenth of the download; alone, since its index has not all versions of the rest, and first, so
+# that a change of the source does not download it again
+COPY constraints.txt .
 RUN pip install --no-cache-dir --no-deps --index-url https://download.pytorch.org/whl/cpu -c constraints.txt torch
+COPY . .
 RUN pip install --no-cache-dir -c constraints.txt -e ".[train,test]"
 # every kernel, so that a container does not compile them again
 ENV NUMBA_CACHE_DIR=/borearl/.cache

@@ -250,9 +250,9 @@ class BorealEnv(Described, gym.Env, EzPickle):
       and the path is the same in every episode; the climate that is observed stays the site's own
     - `objectives`: of the reward vector, "carbon", "thaw" (these two), "active_layer", "permafrost_heat", "timber",
       "biodiversity" and any `Objective` of your own
-    - `timber`: prices and costs, which "timber" needs: "finland", "sweden" or "canada" of `sim/timber_prices.csv`, a
-      .csv with the same columns, or a dict of all its items in EUR; the record then has the revenue, the last step's
-      info the net present value
+    - `timber`: None, or prices and costs, which "timber" needs: "finland", "sweden" or "canada" of
+      `sim/timber_prices.csv`, a .csv with the same columns, or a dict of all its items in EUR; the record then has the
+      revenue, the last step's info the net present value
     - `discount_rate`: of that, a year's (0.03); without `timber` none is allowed
     - `mechanisms`: switches of the physics, see `sim.MECHANISMS`
     - `constants`: literature constants to override, see `sim/constants.csv`

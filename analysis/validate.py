@@ -6,8 +6,8 @@
 
 Held stands on sampled sites against the bands of the literature; two towers, driven by their own weather; the weather
 generator and its calibration; the seasonal course of carbon and water; fire, insects and mortality; stands that run
-free, against chronosequences; field experiments; what the thaw return hangs on; a list of what misses. Every number of
-the document is from the run that wrote it, but for the signs under every constant, which a study of its own finds.
+free, against chronosequences; field experiments; what the thaw return hangs on; a list of what misses. Every
+modelled number is from the run that wrote it, but for the signs under every constant, which a study of its own finds.
 """
 
 from collections.abc import Callable
@@ -77,12 +77,18 @@ PARTS: dict[str, tuple[str, Callable[[Args], Part]]] = {
 
 INTRODUCTION = """# Validation
 
-Written by `python analysis/validate.py`; every number is from that run, but for what every constant turns or moves in
-part 8, which is from `python analysis/studies/planting_signs.py`. Observations, with their sources and licences,
-are in [analysis/observations](../analysis/observations/README.md), equations in [model.md](model.md). Bias is modelled
-less measured, RMSE the root mean square error, r Pearson's correlation. **MISS** is a value outside the band or beyond
-the tolerance that the part states; all of them are listed at the end. Constants that were calibrated to
-observations, some of them to those below, have the mark [C] in [model.md](model.md)."""
+Written by `python analysis/validate.py`; every modelled number is from that run, but for the paragraph on constants in
+part 8, which is from `python analysis/studies/planting_signs.py`. Numbers of the literature and remarks on the records
+were written by hand. Observations, with their sources and licences, are in
+[analysis/observations](../analysis/observations/README.md), equations in [model.md](model.md). Bias is modelled less
+measured, RMSE the root mean square error, r Pearson's correlation. **MISS** is a value outside the band or beyond the
+tolerance that the part states; all of them are listed at the end. *Input* is what the simulator is given, so that it
+cannot miss by itself. Constants that were calibrated to observations, some of them to those below, have the mark [C] in
+[model.md](model.md).
+
+Where nothing else is said, sampled sites are in the world of `boreal-generalist-v0`: weather by the paper's ranges,
+boundary and first soil carbon drawn. Held stands are looked at in that of `boreal-balanced-v0`, too (part 1), and so
+are its weather (part 3), stands that run free in it (part 6) and its thaw return (part 8)."""
 
 
 def assemble(parts: dict[str, Part]) -> str:

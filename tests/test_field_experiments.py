@@ -34,7 +34,7 @@ def test_a_cut_lets_heat_into_the_ground_and_leaves_the_forest_alone():
 
 def test_a_boundary_in_balance_takes_no_heat():
     seeds = [sim.episode_seeds(k) for k in (1, 2)]
-    boundary, heat = balanced_boundary.run_held([sim.sample_site(k) for k in (1, 2)], seeds)
+    boundary, heat = balanced_boundary.run_held([sim.sample_site(k) for k in (1, 2)], seeds, boundary="balanced")
     assert (np.abs(heat) < robustness_report.BALANCE.high).all()
     assert (np.abs(boundary - [sim.sample_site(k)["deep_boundary_temperature_k"] for k in (1, 2)]) > 0.01).all()
 

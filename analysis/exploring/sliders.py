@@ -12,5 +12,5 @@ def put(slider: pn.widgets.base.Widget, value: float) -> None:
     """
     with param.edit_constant(slider):
         slider.param.update(value=value, value_throttled=value)
-    for model, _ in slider._models.values():  # noqa: SLF001: the browser's copy, which panel has no name for
+    for model, _ in slider._models.values():  # the browser's copy, which panel has no name for
         model.set_from_json("value_throttled", value)

@@ -33,6 +33,7 @@ from sim.management import decode
 
 BALANCED = "boreal-balanced-v0"
 LAST = 10  # years that thaw depth is a mean of
+FAR = 1.0  # m of change: permafrost gained or lost, without which the depth is the boundary's
 LAND = Path(__file__).parents[1] / "observations" / "natural_earth_land_110m.csv.gz"
 FIGURE = Path("docs/images/boreal_map.png")
 FIRST_SEED = 5_000_000_000  # of the points' sites and dice: beyond those of training and evaluation
@@ -162,17 +163,23 @@ def study(args: Args, store: str, env_id: str, world: dict, policy: Callable, fo
 def sentences(table: pd.DataFrame, preference: float, years: int) -> str:
     """The answer."""
     planted, mean = table.planted_stems_ha_yr, table.mean()
+    far = table.thaw_depth_change_m.abs() > FAR
     conifers = (planted * table.conifer_share).sum() / max(planted.sum(), 1e-9)
     thaw, carbon = table.thaw_depth_change_m, mean.carbon_change_kgc_m2
 
     def change(metres):
         return f"{abs(metres):.2f} m {'shallower' if metres < 0 else 'deeper'}"
 
+    most = (
+        f" {thaw[far].sum() / thaw.sum():.0%} of that is of the {far.sum():,} stands where it changes by more than "
+        f"{FAR:g} m: without permafrost this depth is the boundary's, 12 m and more."
+    )
     return (
         f"At a carbon weight of {preference:g} the policy plants {planted.mean():.0f} stems/ha a year, {conifers:.0%} "
-        f"of them conifers. In the last {min(LAST, years)} of {years} years thaw is {change(thaw.mean())} than without "
-        f"it in the mean of {len(table):,} stands, {change(thaw.median())} in the middle one ({(thaw < 0).mean():.0%} "
-        f"thaw less deep); at their end a stand has {abs(carbon):.1f} kgC/m2 {'more' if carbon > 0 else 'less'}."
+        f"of them conifers. In the last {min(LAST, years)} of {years} years thaw is {change(thaw.median())} than "
+        f"without it in the middle one of {len(table):,} stands ({(thaw < 0).mean():.0%} thaw less deep), "
+        f"{change(thaw.mean())} in the mean.{most if far.any() else ''} At their end a stand has {abs(carbon):.1f} "
+        f"kgC/m2 {'more' if carbon > 0 else 'less'}."
     )
 
 

@@ -21,6 +21,7 @@ import sim
 from analysis import stored
 from analysis.paths import make_writable
 from analysis.studies import open_loop
+from analysis.validation import document
 from cleanrl_style import protocol
 from sim.parameters import ORDERED_CONSTANTS, Parameter
 from sim.stands import available_cores
@@ -259,7 +260,8 @@ def page(table: pd.DataFrame) -> str:
         f"`{name}`: {SHARE * span:g}, a tenth of {what} ({span:g})" for name, (span, what) in SPANS.items()
     )
     defaults = "\n".join(f"| `{name}` | {meaning} | {default[name]:+.2f} |" for name, meaning in MEASURES.items())
-    return f"""# What the results hang on
+    return (
+        document.fill(f"""# What the results hang on
 
 Written by `python analysis/studies/sensitivity.py`; not to be edited. Every site parameter at the low and the high end
 of its sampled range, and every literature constant {SHARE:.0%} below and above its value, one at a time:
@@ -274,7 +276,8 @@ done. What was measured:
 {defaults}
 
 The tables below give how far each factor moves these: the measure at the high value less that at the low one.
-A constant is not moved past its physical limit, nor more than half way to another that must stay larger; then the step
+A constant is not moved past its physical limit, nor more than half way to another that must stay larger or
+smaller; then the step
 is smaller, as the two columns show; an empty cell is the default. Where zero is arbitrary, {SHARE:.0%} would mean
 nothing and the step (for the constants of that unit, or whose name begins so) is
 {spans}.
@@ -282,15 +285,16 @@ The mean annual temperature follows
 the latitude, as it does when a site is sampled. A range and {SHARE:.0%} are not alike: compare parameters with
 parameters and constants with constants.
 
-Where the thaw reward is clipped at -1 in every year, as at one of the four sites, its effects are nearly zero, and
-means over sites are smaller for it. Nothing burned in the one weather, nothing was cut, and no stand thinned itself:
-zeros of fire, of products and of crowding say nothing about how much they matter. There are no error estimates: read
-sizes, not second digits, and no ranks of `species_thaw`, which differs more between sites and dice than by most
-factors.
+Where the thaw reward is clipped at -1 in every year, as at one of the four sites at the default, small changes have no
+effect, and means over sites are smaller for it. Nothing burned in the one weather, nothing was cut, and no stand
+thinned itself: zeros of fire, of products and of crowding say nothing about how much they matter. There are no error
+estimates: read sizes, not second digits, and no ranks of `species_thaw`, which differs more between sites and dice than
+by most factors.
 
 ## Alternatives
 
-Published values other than ours, and ours with the crowns of both species alike; effects are against the default.
+Published values other than ours; ours with the light use, or the crowns, of both species alike; effects are against the
+default.
 
 {markdown(moved[~site & ~constant])}
 
@@ -323,8 +327,9 @@ share of the largest effect of all.
 
 ## All constants
 
-{markdown(moved[constant])}
-"""
+{markdown(moved[constant])}""")
+        + "\n"
+    )
 
 
 def main(args: Args) -> None:

@@ -12,12 +12,13 @@ YEARS = 10
 UNDISTURBED = {"fire": False, "insects": False}
 
 
-def run_held(sites: list[dict], seeds: list, weather: str = "paper") -> tuple[np.ndarray, ...]:
+def run_held(sites: list[dict], seeds: list, **world) -> tuple[np.ndarray, ...]:
     """Temperature of the boundary in balance [K] and mean heat into it [MJ m-2 yr-1] in the first years, (sites,) each.
 
-    sites : parameters by name; seeds : of each, which give its first stand and weather.
+    sites : parameters by name; seeds : of each, which give its first stand and weather; world : arguments of
+    `sim.Stands`, a boundary in balance among them.
     """
-    stands = sim.Stands(len(sites), mechanisms=UNDISTURBED, boundary="balanced", weather=weather)
+    stands = sim.Stands(len(sites), mechanisms=UNDISTURBED, **world)
     stands.start(np.arange(len(sites)), sites, seeds)
     first = stands.state[:, HELD_COLUMNS].copy()
     column = sim.RECORD_NAMES.index

@@ -26,7 +26,7 @@ drought_index_of = np.vectorize(climate_records.uncompiled(drought_index))
 #: Densities [stems ha-1] at which mortality is measured, by species; at the first no stand thins itself.
 DENSITIES = (800.0, 1500.0, 2000.0)
 
-#: Quantity -> (unit, digits, band by kind, source, likely process behind a miss).
+#: Bands; their sources are below.
 FIRE_RETURN = Band(80.0, 200.0)
 KILLED = Band(0.65, 1.0)
 BURNED = Band(1.5, 4.5)
@@ -40,7 +40,7 @@ SOURCES = {
     "carbon burned": "2004 in the Yukon basin 3.1 ± 0.7, three quarters of it ground layer (Tan et al. 2007)",
     "outbreaks": "the paper's 0.02-0.05 a year",
     "share of conifers killed": "CBM-CFS3, spruce beetle: 2, 10 or 20 % by severity; budworm 45 % over 12 years",
-    "mortality": "FVS-Alaska: spruce 0.3-0.5, birch 0.7-4.4, aspen 0.9-8.7; CLM6 1.7-2.4; LPJmL 1.5",
+    "mortality": "a choice; FVS-Alaska: spruce 0.3-0.5, birch 0.7-4.4, aspen 0.9-8.7; CLM6 1.7-2.4; LPJmL 1.5",
 }
 #: What is a draw or a parameter of the simulator and so cannot miss by itself, and what was calibrated to its band.
 INPUT = ("share of stems killed", "outbreaks", "share of conifers killed")

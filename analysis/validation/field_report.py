@@ -50,15 +50,16 @@ def report(sites: int) -> Part:
     text = f"""{sites} sampled sites, with the climate of the experiment where one is named; all else as drawn. Medians
 over sites (10-90 %). Stands are held as in part 1, without fire and insects.
 
-Larch near Yakutsk, leaf area about 2.5, felled after {clear_cut.YEARS_BEFORE} years: what the cutover has more than the
+Larch near Yakutsk, leaf area about 2.5, felled after {clear_cut.YEARS_BEFORE} years (the model's deciduous tree; the
+climate's half-range and the permafrost's temperature are from memory): what the cutover has more than the
 forest on the same site and in the same weather, in the years after. The organic layer stays that of the forest. Wind is
 {number(JUDGED_WIND, 0)} m/s where judged; the band is the measured within a factor of {number(FACTOR, 0)}.
 
 {document.table(header, cut_rows, left=6)}
 
 Thawing n-factors: the sum of daily mean temperatures above 0 °C at the ground's skin over that of the air, years
-{SKIPPED_YEARS + 1} to {SKIPPED_YEARS + KEPT_YEARS}. Below the skin, at the top of the mineral soil, and freezing
-n-factors have no verdict. Air is above the canopy.
+{SKIPPED_YEARS + 1} to {SKIPPED_YEARS + KEPT_YEARS}. Below the skin, at the top of the mineral soil, freezing
+n-factors and open ground have no verdict. Air is above the canopy.
 
 {document.table(header, floor_rows, left=6)}
 

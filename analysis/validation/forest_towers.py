@@ -50,10 +50,14 @@ def mean_annual_temperature() -> pd.Series:
     return course.mean(axis=1).where(course.notna().all(axis=1))
 
 
-def near_climate() -> list[str]:
-    """Sites without a disturbance since UNDISTURBED_BEFORE whose mean annual temperature is at most WARMEST_C."""
+def disturbance_years() -> pd.Series:
+    """Year of each site's last recorded disturbance; NaN where the table has none."""
     table = towers.read_table("ABCflux_boreal_forests_monthly.csv.gz").drop_duplicates("site").set_index("site")
-    since = table["disturb_year"].astype("string").str.extract(r"(\d{4})")[0].astype(float)
-    undisturbed = ~(since >= UNDISTURBED_BEFORE)
-    temperature = mean_annual_temperature()
-    return [site for site in table.index[undisturbed] if temperature[site] <= WARMEST_C]
+    return table["disturb_year"].astype("string").str.extract(r"(\d{4})")[0].astype(float)
+
+
+def near_climate() -> list[str]:
+    """Sites without a recorded disturbance since UNDISTURBED_BEFORE whose mean annual temperature is at most
+    WARMEST_C."""
+    since, temperature = disturbance_years(), mean_annual_temperature()
+    return [site for site in since.index if not since[site] >= UNDISTURBED_BEFORE and temperature[site] <= WARMEST_C]

@@ -9,6 +9,7 @@ import numpy as np
 
 import sim
 from analysis.validation.held_stands import NO_CHANGE, Run
+from boreal_env import BALANCED_WORLD
 from sim.demography import AGES, stem_weight
 from sim.jit import uncompiled
 from sim.state import PARAMETER_NAMES, STATE
@@ -27,7 +28,8 @@ STEM_KGC, STEM_EXPONENT = 0.035, 2.5
 @dataclass(frozen=True)
 class Course:
     """A kind of stand: its first stocks (the rest is drawn), what is done in the first year and in all later ones, for
-    how many years, which mechanisms are off, and whether it burns in the first year."""
+    how many years, which mechanisms are off, whether it burns in the first year, and in which world (arguments of
+    `sim.Stands`)."""
 
     initial: dict = field(default_factory=dict)
     first_action: int = NO_CHANGE
@@ -35,6 +37,7 @@ class Course:
     years: int = STAND_YEARS
     mechanisms: dict = field(default_factory=dict)
     burned: bool = False
+    world: dict = field(default_factory=dict)
 
 
 MATURE = {"conifer_mature_stems_ha": 500.0, "deciduous_mature_stems_ha": 500.0, "biomass_kgc_m2": 6.0}
@@ -47,6 +50,18 @@ EPISODES = {
     "planted every year, conifers": Course(first_action=PLANT_CONIFERS, action=PLANT_CONIFERS),
     "planted every year, half": Course(first_action=PLANT_HALF, action=PLANT_HALF),
     "planted every year, deciduous": Course(first_action=PLANT_DECIDUOUS, action=PLANT_DECIDUOUS),
+}
+
+#: Two of them in the world of `boreal-balanced-v0`.
+BALANCED = {
+    "left alone, balanced": Course(world=BALANCED_WORLD),
+    "planted every year, half, balanced": Course(first_action=PLANT_HALF, action=PLANT_HALF, world=BALANCED_WORLD),
+}
+
+#: Stands left alone that do not burn, as the stands of a chronosequence have not since their origin.
+UNBURNED = {
+    "left alone, no fire": Course(mechanisms={"fire": False}),
+    "mature stand left alone, no fire": Course(MATURE, mechanisms={"fire": False}),
 }
 
 #: A mature stand that burns in the first year, and not again: its age is the time since fire.
@@ -65,7 +80,7 @@ EVEN_AGED = {
 
 def grow(course: Course, sites: int) -> Run:
     """Run a kind of stand on sampled sites 0 to `sites` - 1; annual records and `basal_area_m2_ha`, (years, sites)."""
-    stands = sim.Stands(sites, mechanisms=course.mechanisms)
+    stands = sim.Stands(sites, mechanisms=course.mechanisms, **course.world)
     parameters = [sim.sample_site(k) for k in range(sites)]
     seeds = [sim.episode_seeds(k) for k in range(sites)]
     stands.start(np.arange(sites), parameters, seeds, initial=dict.fromkeys(range(sites), course.initial))

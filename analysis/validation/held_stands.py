@@ -1,7 +1,7 @@
 """Stands of one kind on many sampled sites, held as they are while weather, water, heat and carbon fluxes run.
 
-On every 1 January trees, soil carbon and organic layer are put back to those of the first year, so that the fluxes
-belong to the stand described and not to what it grows into. All kinds have the same sites, weather and dice.
+On every 1 January trees, dead wood, soil carbon and organic layer are put back to those of the first year, so that the
+fluxes belong to the stand described and not to what it grows into. All kinds have the same sites, weather and dice.
 """
 
 from dataclasses import dataclass

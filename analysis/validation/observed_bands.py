@@ -16,7 +16,7 @@ FORESTS = tuple(kind for kind in KINDS if kind != "open")
 MATURE = ("mature conifer", "mature deciduous", "mature mixed")
 FELLED = "felled conifers"  # open ground with the organic layer of the conifers that stood there
 
-CONIFERS = ("mature conifer", "mature mixed")  # no band is that of a single aspen forest
+CONIFERS = ("mature conifer", "mature mixed")  # of GPP and respiration: of the towers one is in a forest of aspen
 BETTS = "Betts and Ball 1997, ± 25 %"
 
 
@@ -63,7 +63,7 @@ def net_production(run: Run) -> np.ndarray:
 
 
 def use_efficiency(run: Run) -> np.ndarray:
-    """Share of GPP that is not respired by the trees."""
+    """Share of GPP that trees and understorey do not respire."""
     gpp, autotrophic, _ = carbon(run)
     return 1.0 - autotrophic / gpp
 
@@ -155,7 +155,7 @@ CHECKS = {
         "day of year",
         snow_off,
         _for(ALL, 93.0, 145.0),
-        "towers 93-133 (US-Prr, US-Uaf 2011-20), later where colder",
+        "US-Prr 98-133 (2011-20), US-Uaf from 93 (not stored here); 145, where colder, is a choice",
         "ageing of the snow's albedo",
         "melt below a canopy",
         digits=0,
@@ -182,7 +182,8 @@ CHECKS = {
         "K",
         surface_offset,
         _for(ALL, 1.7, 5.0),
-        "US-Prr 3.1 (2011-14), SE-Svb 1.7 (2019); Zhang et al. 2018; snow alone 5.1 ± 3.2 (Peng et al. 2024)",
+        "US-Prr 3.1 (2011-14), SE-Svb 1.8 (2019, November and December filled); limits by choice; Zhang et al. 2018; "
+        "snow alone 5.1 ± 3.2 (Peng et al. 2024)",
         "dense, thin snow",
         "snow",
         digits=1,

@@ -41,21 +41,22 @@ def report(sites: int, quick: bool = False) -> Part:
     sampled = [sim.sample_site(seed) for seed in numbers]
     played = {name: _play(sampled, seeds, PLANS, years, **world) for name, world in WORLDS.items()}
     rows, within = zip(*(_variance(name, episodes) for name, episodes in played.items()), strict=True)
-    boundary, heat = balanced_boundary.run_held(sampled, seeds, BALANCED_WORLD["weather"])
+    boundary, heat = balanced_boundary.run_held(sampled, seeds, **BALANCED_WORLD)
     shift = np.abs(boundary - [site[BOUNDARY] for site in sampled])
     signs, misses = _signs(quick)
     low, middle, high = (number(value, 1) for value in np.percentile(heat, [5, 50, 95]))
     header = ["world", "zero change", "s.d. over sites", "site", "policy", "site x policy", "years clipped"]
     text = f"""The thaw return over {years} years, as rewarded, on {sites} sampled sites with their own first stands; a
-weather for each site, the same for every plan. Shares of its variance are components of a crossed design of sites and
-four plans ({", ".join(PLANS)} stems/ha a year), of which the interaction is what is left. In balance, the boundary of
-each site is at the temperature at which its own first stand, held, gives it no heat, as the spin-up finds it; in
-`boreal-balanced-v0` the weather is as observed, too, and the first soil carbon in balance. There the boundary moved by
-{number(float(np.median(shift)), 1)} K (median), and what flows through it in {balanced_boundary.YEARS} years below held
-stands is {middle} MJ/m2/yr ({low} .. {high}, 5-95 % of sites). In the first {BALANCE_YEARS} years of zero change, when
-stands are free, it is within {number(BALANCE.high, 0)} MJ/m2/yr of zero at {percent(within[0])} of the sites with the
-boundary as sampled, at {percent(within[1])} with the boundary in balance and at {percent(within[2])} in
-`boreal-balanced-v0`.
+weather for each site, the same for every plan, with fire and insects; an action that cannot be carried out in full is
+left out. *Years clipped* are years in which the reward is −1 or 1, on average over the plans. Shares of its variance
+are components of a crossed design of sites and four plans ({", ".join(PLANS)} stems/ha a year), of which the
+interaction is what is left. In balance, the boundary of each site is at the temperature at which its own first stand,
+held, gives it no heat, as the spin-up finds it; in `boreal-balanced-v0` the weather is as observed, too, and the first
+soil carbon in balance. There the boundary moved by {number(float(np.median(shift)), 1)} K (median), and what flows
+through it in {balanced_boundary.YEARS} years below held stands (without fire and insects) is {middle} MJ/m2/yr ({low}
+.. {high}, 5-95 % of sites). In the first {BALANCE_YEARS} years of zero change, when stands are free, it is within
+{number(BALANCE.high, 0)} MJ/m2/yr of zero at {percent(within[0])} of the sites with the boundary as sampled, at
+{percent(within[1])} with the boundary in balance and at {percent(within[2])} in `boreal-balanced-v0`.
 
 {document.table([*header, *list(PLANS)[1:]], list(rows), left=1)}
 
@@ -161,7 +162,8 @@ def signs_found(table: pd.DataFrame, sites: int) -> tuple[str, list[Miss]]:
     listed = document.table(header, rows, left=7) if rows else "No constant does either."
     count = table[table.constant != "default"].constant.nunique()
     text = f"""Every constant 10 % below and above its value ({count} constants; steps as in
-[sensitivity.md](sensitivity.md)), one at a time, in both worlds, on {sites} sites that span what is sampled, without
+[sensitivity.md](sensitivity.md)), one at a time, in `boreal-generalist-v0` and
+`boreal-balanced-v0`, on {sites} sites that span what is sampled, without
 fire and insects. {" ".join(of_worlds)} Listed are constants that turn a sign, and those that move zero change by more
 than {number(ZERO_CHANGE.high, 0)}.
 

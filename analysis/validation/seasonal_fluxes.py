@@ -75,15 +75,17 @@ def report(sites: int) -> Part:
             rows += _rows(unit, f"{forest_towers.ASPEN}, aspen", aspen, DECIDUOUS, course)
             rows[-1] += ["", ""]
     temperature = forest_towers.mean_annual_temperature()[forest_towers.near_climate()]
+    dated = forest_towers.disturbance_years()[temperature.index].notna().sum()
     text = f"""Mature stands held as in part 1 on {sites} sites, {YEARS} years, over the towers in forests without a
-disturbance since {forest_towers.UNDISTURBED_BEFORE} and with a mean annual temperature of at most
+recorded disturbance since {forest_towers.UNDISTURBED_BEFORE} ({len(temperature) - dated} of the {len(temperature)} have
+no year of one at all) and with a mean annual temperature of at most
 {forest_towers.WARMEST_C:g} degC: {", ".join(temperature.index)}. Carbon is from ABCflux, water from FLUXNET2015. They
 average {number(temperature.min(), 1)} to {number(temperature.max(), 1)} degC, the paper's sites −10 to −5: GPP as the
 towers have it is no evidence that it is right for sites so much colder. Medians over sites, of
 towers each with the median of its years. A course misses if its bias exceeds {percent(TOLERANCE)} of the towers' mean
-magnitude; months outside are those in which it leaves the towers' range by more than {percent(MARGIN)} of their largest
-month. All towers but one stand in forests of conifers; deciduous stands are set beside that one,
-{forest_towers.ASPEN}, at {number(temperature[forest_towers.ASPEN], 1)} degC, without a verdict.
+magnitude (RMSE is not judged here); months outside are those in which it leaves the towers' range by more than
+{percent(MARGIN)} of their largest month. All towers but one stand in forests of conifers; deciduous stands are set
+beside that one, {forest_towers.ASPEN}, at {number(temperature[forest_towers.ASPEN], 1)} degC, without a verdict.
 
 {document.table(["", "", *calendar.month_abbr[1:], "bias", "RMSE", "r", "months outside", "verdict"], rows, left=2)}
 

@@ -39,7 +39,7 @@ def tower_years() -> pd.DataFrame:
     """Mean annual GPP and NEP of towers over stands of known age, rows as in `observed`.
 
     A year is the sum of the twelve calendar months' means; the age is that in the record's middle year. Towers warmer
-    than `forest_towers.WARMEST_C` are left out, and those that lack a month or photosynthesise in winter.
+    than `forest_towers.WARMEST_C` are left out, mixed stands, and those that lack a month or photosynthesise in winter.
     """
     origin = year_of_origin()
     warmth = forest_towers.mean_annual_temperature()

@@ -1,7 +1,7 @@
 """Fluxes of the simulator under a tower's weather, day by day beside the measured ones.
 
-A day counts if at least half of it was measured and none of it is missing; a month if it has five such days. Carbon is
-in gC m-2 day-1, heat in W m-2, temperature in degC.
+A day counts if at least half of it was measured, where the record says so, and none of it is missing; a month if it has
+five such days. Carbon is in gC m-2 day-1, heat in W m-2, temperature in degC.
 """
 
 import calendar

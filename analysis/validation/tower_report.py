@@ -28,7 +28,7 @@ SNOW_DENSITY = (170.0, 217.0)  # kg m-3: Ikawa et al. 2024 at US-Prr in March 20
 LIKELY = {
     "SE-Svb": {
         "GPP": "light use is that of ten Nordic forests; what the understorey adds is counted again; the record "
-        "derives it from net exchange with a respiration that doubles within days of August",
+        "derives it from net exchange with a respiration that doubles in twelve days of August",
         "ecosystem respiration": "soil carbon is assumed; respiration of roots follows the air, not the warm soil",
         "net exchange": "respiration follows the temperature of air and soil alone, the record's changes within days",
         "latent heat": "transpiration follows net radiation; canopy evaporation in autumn",
@@ -138,13 +138,15 @@ def report(repeats: int) -> Part:
             weeks=False,
         ),
     }
-    return Part(f"{_INTRODUCTION}\n\n{svb_text}\n\n{prr_text}", figures, [*misses, *svb_misses, *prr_misses])
+    again = f"A tower's years are run {repeats} times over, so that soil and snow are in balance; the last is compared."
+    return Part(f"{_INTRODUCTION} {again}\n\n{svb_text}\n\n{prr_text}", figures, [*misses, *svb_misses, *prr_misses])
 
 
 _INTRODUCTION = f"""The simulator takes the tower's weather instead of its own, and a stand from inventories
-(`analysis/validation/tower_stands.py` has every value with its source). One constant was calibrated on fluxes of these
-towers: the Priestley-Taylor coefficient of conifers (LE/(LE + H) of June to August at SE-Svb, even days only; part 3).
-Those of the weather generator are not in play here.
+(`analysis/validation/tower_stands.py` has every value with its source; soil carbon and boundary are in part assumed,
+and at SE-Svb the boundary has the mean of the soil temperature that is compared). One constant was calibrated on fluxes
+of these towers: the Priestley-Taylor coefficient of conifers (LE/(LE + H) of June to August at SE-Svb, even days only;
+part 3). Those of the weather generator are not in play here.
 
 A quantity misses if the bias of its months (modelled less measured) exceeds {percent(QUANTITIES["GPP"].tolerance)} of
 their mean magnitude, or their RMSE {percent(QUANTITIES["GPP"].largest_rmse)} of it, as where seasons go wrong that make
@@ -152,7 +154,8 @@ up for each other; for temperature, {QUANTITIES["soil temperature"].tolerance:g}
 {QUANTITIES["soil temperature"].largest_rmse:g} degC; for albedo, {QUANTITIES["albedo"].tolerance:g} of bias; for the
 day that snow is gone, {tower_comparison.DAYS_OF_SNOW_OFF:g} days; for a depth of snow,
 {percent(SNOW_DEPTH_TOLERANCE)}. Only days count on which at least {percent(tower_comparison.MEASURED_SHARE)} of the
-quantity was measured, and months of at least {tower_comparison.FEWEST_DAYS} such days; n is the
+quantity was measured (at US-Prr: measured or filled well; where a record has no flag, as for ground heat there and
+radiation at SE-Svb, every value), and months of at least {tower_comparison.FEWEST_DAYS} such days; n is the
 number of months or days. The worst month has the largest gap."""
 
 
@@ -189,8 +192,8 @@ record loses {number(lost, 0)} MJ m⁻² in the year, a mean of {number(lost / D
 measured at 5 cm; the model's is the top of the mineral soil. From
 {counts[counts].index[-1] + pd.Timedelta(days=1):%-d %B} on its record is filled with one value and not compared.
 
-**Carbon.** What was measured is net exchange. The record's respiration doubles within days in early August and halves
-in mid-September, while the soil's temperature does neither; GPP, which is derived from it, follows.
+**Carbon.** What was measured is net exchange. The record's respiration doubles from 4 to 16 August, with the soil 2 K
+warmer at most, and halves in a week of September in which it cools by 3 K; GPP, which is derived from it, follows.
 
 {tower_comparison.skill_table(pairs, UNJUDGED["SE-Svb"])}
 
@@ -233,7 +236,8 @@ the day as `sim/io/disaggregation.py` says (temperature by a cosine of half-rang
 {number(_spring_cycle().half_range_per_shortwave, 3)} K per W m⁻² of the day's shortwave with its peak at
 {number(_spring_cycle().peak_hour, 1)} h, both from the half-hourly spring of 2013; shortwave by the sun's height).
 Precipitation of frosty days is ERA-Interim's, because the gauge catches half of it. GPP and respiration are the
-daytime partitioning; the night-time one gives GPP of 0.7-1.4 gC m⁻² day⁻¹ in January and February. Net radiation is
+daytime partitioning; the night-time one gives GPP of 0.7 and 1.3 gC m⁻² day⁻¹ in January and February, on average of
+the four years. Net radiation is
 the sum of its four components (the published sum differs from it by up to 39 W m⁻² in months of 2011-13). From June
 to August LE/(LE + H) is {number(measured)} measured, {number(modelled)} modelled. Soil was measured 5 cm below the
 14 cm of moss, {SENSOR_DEPTH_M:g} m below the surface and within the 0.30 m of organic layer; the model's is taken
@@ -334,7 +338,9 @@ def _spring(spread: Comparison, measured: Comparison) -> tuple[str, list[Miss]]:
     if abs(100.0 * deep / depth - 1.0) > SNOW_DEPTH_TOLERANCE:
         what = f"snow in March 2013: {number(100.0 * deep, 0)} cm deep, measured {number(depth, 0)}"
         found.append(Miss(spread.site, what, "too little snow (sublimation), and too dense"))
-    text = f"""The spring of 2013 was measured in half-hours. The same run with them in place of the spread days:
+    text = f"""The spring of 2013 was measured in half-hours. The same run with them in place of the spread days
+    (precipitation
+stays spread):
 
 {document.table(header, rows)}
 

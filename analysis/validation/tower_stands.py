@@ -21,7 +21,8 @@ SE_SVB = TowerStand(
     # about 100 years old, basal area 29.3 m2/ha, top height 20 m.
     site={
         "latitude_deg": 64.256,
-        # The record's own annual wave; no permafrost: the soil at 5 cm was 4.2 degC on average.
+        # The record's own annual wave; no permafrost: the boundary has the mean of the soil at 5 cm, 4.2 degC, November
+        # and December filled.
         "mean_annual_temperature_c": 2.5,
         "seasonal_amplitude_c": 11.3,
         "deep_boundary_temperature_k": 277.4,
@@ -56,7 +57,7 @@ US_PRR = TowerStand(
         "crown_area_conifer_m2": 0.60,
         "canopy_reference_height_m": 9.5,  # wind at 11 m over a displacement height of 1.46 m (Ikawa et al. 2024)
         # Moss 0.14 m above the sensors' zero (Ikawa et al. 2024) and organic soil to 0.35 m below the surface
-        # (Launiainen's set-up of pyAPES for US-Prr); kept there.
+        # (Launiainen's set-up of pyAPES for US-Prr): 0.30 by choice; kept there.
         **dict.fromkeys(("organic_depth_conifer_m", "organic_depth_deciduous_m", "organic_depth_open_m"), 0.30),
         # Mean of 16 quadrats: cloudberry, Labrador tea, lingonberry, cottongrass, bog birch.
         "understorey_lai": 0.784,

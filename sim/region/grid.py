@@ -71,7 +71,10 @@ def climate_at(climate, latitude: np.ndarray, longitude: np.ndarray) -> pd.DataF
         try:
             file = (xarray.open_zarr if Path(climate).is_dir() else xarray.open_dataset)(climate)
         except (OSError, ValueError) as error:
-            raise ValueError(f"climate: {climate} cannot be read as a NetCDF file or a zarr store") from error
+            raise ValueError(
+                f"climate: {climate} cannot be read as a zarr store or a NetCDF file, or netCDF4 or h5netcdf is not "
+                "installed, which read it"
+            ) from error
         with file:
             return climate_at(file, latitude, longitude)
     if not isinstance(climate, xarray.Dataset):
