@@ -176,9 +176,7 @@ def knowing_the_site() -> str:
             for way in site_choice.WAYS[1:]
         ]
         by_parameters = fitted.loc[row.task]
-        scores.append(
-            f"{by_parameters.score:.1f} [{by_parameters.score_low:.1f}, {by_parameters.score_high:.1f}]",
-        )
+        scores.append(f"{by_parameters.score:.1f} [{by_parameters.score_low:.1f}, {by_parameters.score_high:.1f}]")
         thaw = table[(table.task == row.task) & (table.weight.astype(str) == "0.0")].iloc[0]
         spread = [f"{thaw[name]:.2f}" for name in ("sd_sites", "sd_dice")]
         rows.append([f"`{row.task}`", "100", *scores, conifers_less_deciduous(thaw), *spread])

@@ -18,13 +18,7 @@ from cleanrl_style.protocol.run_folder import as_text
 ROOT = Path(__file__).parents[1]
 GENERALIST, BALANCED, ONE_SITE = "boreal-generalist-v0", "boreal-balanced-v0", "boreal-site-specific-v0"
 OTHER_WORLDS = ("boreal-timber-v0", "boreal-four-v0", "boreal-warming-v0")
-STUDIES = (
-    "constant_plans",
-    "mechanism_pairs",
-    "site_warming",
-    "signal_to_noise",
-    "gradient_noise",
-)
+STUDIES = ("constant_plans", "mechanism_pairs", "site_warming", "signal_to_noise", "gradient_noise")
 READING = ("site_warming",)  # studies that read the runs before them
 WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SITE_SEEDS = (1, 2, 3, 4, 5)

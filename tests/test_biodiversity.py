@@ -6,15 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from playing import play, quick
 
-from sim.task.biodiversity import (
-    CLASSES,
-    DEADWOOD_M3,
-    biodiversity_index,
-    deadwood,
-    old_trees,
-    open_ground,
-    structure,
-)
+from sim.task.biodiversity import CLASSES, DEADWOOD_M3, biodiversity_index, deadwood, old_trees, open_ground, structure
 from sim.task.timber import VOLUME
 
 

@@ -213,11 +213,7 @@ def test_the_papers_tables(tmp_path):
     verdicts = {claim: found(claim, tmp_path)[0].verdict for claim in paper_itself.CLAIMS}
     contradict = {claim for claim, verdict in verdicts.items() if verdict == CONTRADICTS}
     assert verdicts[paper_itself.control_by_chance] == HOLDS
-    assert contradict == {
-        paper_itself.spreads,
-        paper_itself.strategies,
-        paper_itself.gated_warming,
-    }
+    assert contradict == {paper_itself.spreads, paper_itself.strategies, paper_itself.gated_warming}
     assert verdicts[paper_itself.hypervolumes] == verdicts[paper_itself.heuristic_hypervolumes] == UNTESTABLE
     assert verdicts[paper_itself.scalarised] == verdicts[paper_itself.violations] == HOLDS
     assert found(paper_itself.hypervolumes, tmp_path)[1]["hypervolume, Curriculum PPO"] == "120 from its details"
@@ -416,11 +412,7 @@ def test_controls_are_told_apart_by_their_flags(tmp_path):
                 vectorization="lockstep",
                 **flags,
             )
-    wanted = {
-        curriculum.same_training: (1, HOLDS),
-        curriculum.coin: (-3, FAILS),
-        curriculum.more_data: (-1, FAILS),
-    }
+    wanted = {curriculum.same_training: (1, HOLDS), curriculum.coin: (-3, FAILS), curriculum.more_data: (-1, FAILS)}
     for claim, (apart, verdict) in wanted.items():
         finding, ours = found(claim, tmp_path)
         assert (ours["difference, paired by seed"].value, finding.verdict) == (apart, verdict)

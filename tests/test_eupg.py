@@ -139,14 +139,7 @@ def learn(script, folder, *arguments):
 @pytest.mark.slow
 def test_fixed_lambda_learns_the_toy(tmp_path):
     returns = learn(
-        "eupg_fixed_lambda",
-        tmp_path,
-        "--preference",
-        1,
-        "--learning-rate",
-        0.005,
-        "--total-timesteps",
-        16_000,
+        "eupg_fixed_lambda", tmp_path, "--preference", 1, "--learning-rate", 0.005, "--total-timesteps", 16_000
     )
     assert returns.index.tolist() == [1.0]
     assert returns[1.0] > 0.95 * optimal_return(1)

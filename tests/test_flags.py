@@ -100,10 +100,7 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
         ),
         (["--reward-scales", "1"], r"--reward-scales: 2 numbers, of carbon, thaw, are allowed, not \[1.0\]"),
         (["--reward-scales", "0", "0"], "--reward-scales: not all of them 0, which leaves nothing to learn"),
-        (
-            ["--env-id", "boreal-timber-v0", "--eval-weights", "0.5"],
-            "--eval-weights: 3 numbers a weight, not 1 in all",
-        ),
+        (["--env-id", "boreal-timber-v0", "--eval-weights", "0.5"], "--eval-weights: 3 numbers a weight, not 1 in all"),
         (
             ["--run-dir", f"{__file__}/run"],
             rf"--run-dir {__file__}/run: cannot write there \(not a folder: {__file__}\)",

@@ -35,11 +35,7 @@ def results(monkeypatch):
 
     def scores(replicates):
         value = SCORES[replicates[0]]
-        return {
-            "score_greedy": value,
-            "score_greedy_low": value - 5.0,
-            "score_greedy_high": value + 5.0,
-        }
+        return {"score_greedy": value, "score_greedy_low": value - 5.0, "score_greedy_high": value + 5.0}
 
     plans = {(name, env_id, "default"): [PLANS[name]] for name in PLANS for env_id in main_points.WORLDS}
     monkeypatch.setattr(main_results, "scores", scores)

@@ -99,11 +99,7 @@ def test_one_point_has_no_sparsity():
 
 @pytest.mark.parametrize(
     "method, hypervolume, sparsity, violations",
-    [
-        ("curriculum_ppo", 119.80, 3.4, 50),
-        ("ppo_gated", 65.20, 19.5, 100),
-        ("eupg_variable_lambda", 24.54, 14.4, None),
-    ],
+    [("curriculum_ppo", 119.80, 3.4, 50), ("ppo_gated", 65.20, 19.5, 100), ("eupg_variable_lambda", 24.54, 14.4, None)],
 )
 def test_paper_against_its_own_details(method, hypervolume, sparsity, violations):
     front = paper_front(method)

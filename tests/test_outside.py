@@ -81,13 +81,7 @@ FLAGS = {
 
 @pytest.mark.parametrize(
     ("script", "env_id"),
-    [
-        ("pcn", QUICK),
-        ("gpi_ls", TIMBER),
-        ("envelope", "boreal-four-v0"),
-        ("morld", QUICK),
-        ("maskable_ppo", TIMBER),
-    ],
+    [("pcn", QUICK), ("gpi_ls", TIMBER), ("envelope", "boreal-four-v0"), ("morld", QUICK), ("maskable_ppo", TIMBER)],
 )
 def test_a_run_is_as_ours(tmp_path, script, env_id):
     pytest.importorskip(LIBRARIES.get(script, "morl_baselines"))

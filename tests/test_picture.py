@@ -138,11 +138,7 @@ def timber(year):
     return year["harvest_kgc_m2"]
 
 
-@pytest.mark.parametrize(
-    "objectives",
-    [("thaw",), ("carbon", "thaw", boreal_env.Objective("timber", timber))],
-    ids=len,
-)
+@pytest.mark.parametrize("objectives", [("thaw",), ("carbon", "thaw", boreal_env.Objective("timber", timber))], ids=len)
 def test_pictures_of_any_number_of_objectives(objectives):
     env = boreal_env.BorealEnv(render_mode="rgb_array", objectives=objectives, mechanisms=NO_FIRE)
     two = boreal_env.BorealEnv(render_mode="rgb_array", mechanisms=NO_FIRE)

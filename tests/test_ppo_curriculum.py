@@ -329,11 +329,7 @@ def test_a_coins_run_resumes_to_the_same_bytes(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        ["--reward-scales", 3, 0.5],
-        ["--per-objective-advantages"],
-        ["--per-objective-advantages", "--clip-vloss"],
-    ],
+    [["--reward-scales", 3, 0.5], ["--per-objective-advantages"], ["--per-objective-advantages", "--clip-vloss"]],
 )
 def test_a_flag_changes_the_updates_and_no_units(arguments, finished_run, tmp_path):
     train(tmp_path, *arguments)

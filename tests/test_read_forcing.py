@@ -380,10 +380,7 @@ def test_gaps_are_filled_by_the_records_own_reanalysis_first():
 
 @pytest.mark.parametrize(
     ("value", "message"),
-    [
-        (270.0, r"TA_ERA is 270 degC; \[-75, 50\] degC is allowed"),
-        (30.0, r"TA_F is 30 degC from .* without a change"),
-    ],
+    [(270.0, r"TA_ERA is 270 degC; \[-75, 50\] degC is allowed"), (30.0, r"TA_F is 30 degC from .* without a change")],
 )
 def test_what_a_reanalysis_fills_is_looked_at(value, message):
     table = records.fluxnet()

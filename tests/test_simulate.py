@@ -885,19 +885,10 @@ SEED = sim.episode_seeds(0)
         (lambda s: s.step([12], stands=[2]), "stands: indices in"),
         (lambda s: s.step([12, 12], days=0), "days: a positive integer is allowed, got 0"),
         (lambda s: s.step([12, 12], days=366), "days = 366: at most 365 are allowed"),
-        (
-            lambda s: s.step([12, 12], observed=np.zeros((4380, 5))),
-            r"observed: .* got shape \(4380, 5\)",
-        ),
+        (lambda s: s.step([12, 12], observed=np.zeros((4380, 5))), r"observed: .* got shape \(4380, 5\)"),
         (lambda s: s.step([12, 12], observed=np.full((4380, 6), np.nan)), "observed: finite floats"),
-        (
-            lambda s: s.step([12, 12], observed=np.ones((4380, 6), int)),
-            "observed: finite floats .* of type int64",
-        ),
-        (
-            lambda s: s.start(0, [{**MIDDLE, "latitude_deg": 640.0}], [SEED]),
-            "latitude_deg = 640 is outside",
-        ),
+        (lambda s: s.step([12, 12], observed=np.ones((4380, 6), int)), "observed: finite floats .* of type int64"),
+        (lambda s: s.start(0, [{**MIDDLE, "latitude_deg": 640.0}], [SEED]), "latitude_deg = 640 is outside"),
         (lambda s: s.start(0, [{**MIDDLE, "latitude_deg": "64"}], [SEED]), "latitude_deg: a finite number is allowed"),
         (lambda s: s.start(0, [{**MIDDLE, "latitude": 64.0}], [SEED]), "unknown site parameter 'latitude'"),
         (lambda s: s.start(0, [{"latitude_deg": 64.0}], [SEED]), "site: mean_annual_temperature_c is missing"),

@@ -22,8 +22,7 @@ def test_skill_without_a_pair_is_nan():
 
 
 @pytest.mark.parametrize(
-    ("value", "verdict"),
-    [(0.39, "MISS, low"), (0.4, "in"), (0.6, "in"), (0.8, "in"), (0.81, "MISS, high")],
+    ("value", "verdict"), [(0.39, "MISS, low"), (0.4, "in"), (0.6, "in"), (0.8, "in"), (0.81, "MISS, high")]
 )
 def test_a_band_contains_its_ends(value, verdict):
     assert Band(0.4, 0.8).verdict(value) == verdict

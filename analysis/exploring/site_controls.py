@@ -7,16 +7,7 @@ from dataclasses import dataclass
 import panel as pn
 
 from analysis.exploring.sliders import put
-from analysis.exploring.stands import (
-    PAPER,
-    PLACES,
-    WORLDS,
-    Setting,
-    evaluation_site,
-    evaluation_sites,
-    moved,
-    place,
-)
+from analysis.exploring.stands import PAPER, PLACES, WORLDS, Setting, evaluation_site, evaluation_sites, moved, place
 from sim.physical_constants import FREEZING_POINT_K
 from sim.spin_up import BOUNDARY
 

@@ -3,17 +3,7 @@
 import numpy as np
 
 from analysis import metrics
-from analysis.figures.common import (
-    OF_SITES,
-    SEEDS_95,
-    STEPS,
-    band,
-    finish,
-    learners,
-    learning_curve,
-    legend,
-    panels,
-)
+from analysis.figures.common import OF_SITES, SEEDS_95, STEPS, band, finish, learners, learning_curve, legend, panels
 from cleanrl_style.protocol.fronts import evaluation_weights
 
 SIZE = (7, 5.2)

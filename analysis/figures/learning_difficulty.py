@@ -20,12 +20,7 @@ CAPTION = (
     "interval to the right edge has no end; diamonds: of the effect as a generalised advantage (GAE) sees it, which "
     "may have the other sign. (b, d) Green: carbon, blue: thaw."
 )
-COMPONENTS = {
-    "site": "#0072B2",
-    "weather": "#56B4E9",
-    "policy": "#D55E00",
-    "site x policy": "#E69F00",
-}
+COMPONENTS = {"site": "#0072B2", "weather": "#56B4E9", "policy": "#D55E00", "site x policy": "#E69F00"}
 REST = "#DDDDDD"
 OF = {"carbon": ("#009E73", "o"), "thaw": ("#0072B2", "s")}
 TRAINING_EPISODES = DEFAULT_STEPS["generalist"] // DEFAULT_YEARS

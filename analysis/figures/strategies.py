@@ -4,15 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import to_rgba
 
-from analysis.figures.common import (
-    SEEDS_95,
-    finish,
-    learners,
-    legend,
-    panels,
-    season_curves,
-    year_curve,
-)
+from analysis.figures.common import SEEDS_95, finish, learners, legend, panels, season_curves, year_curve
 
 SIZE = (7, 5.2)
 MADE_BY = "python analysis/reproduce.py --only main"

@@ -105,12 +105,7 @@ def carbon_is_learnt(evidence):
     return finding(rows_of(evidence, CARBON, "rises"), above(share, PART, what="the share learnt"))
 
 
-@claim(
-    "Agents trained for thaw alone hardly improve.",
-    "Section 4.2, figure 2a",
-    FIXED,
-    note=LIMIT,
-)
+@claim("Agents trained for thaw alone hardly improve.", "Section 4.2, figure 2a", FIXED, note=LIMIT)
 def thaw_is_not_learnt(evidence):
     share = seeds(share_learnt(evidence, THAW))
     return finding(rows_of(evidence, THAW, "hardly rises"), below(share, PART, what="the share learnt"))
@@ -249,13 +244,7 @@ def carbon_density(evidence):
     return finding([Row("stems/ha at an episode's end, last tenth of training", "1280", density)], about(density, 1280))
 
 
-@claim(
-    "Thaw agents stay at 1000 to 1020 stems/ha.",
-    "Section 4.2, figure 2c",
-    FIXED,
-    note=LACK_OF_LEARNING,
-    kind=LEVEL,
-)
+@claim("Thaw agents stay at 1000 to 1020 stems/ha.", "Section 4.2, figure 2c", FIXED, note=LACK_OF_LEARNING, kind=LEVEL)
 def thaw_density(evidence):
     density = seeds(at_the_end(evidence, THAW, "final_density"))
     return finding(
@@ -264,12 +253,7 @@ def thaw_density(evidence):
     )
 
 
-@claim(
-    "Carbon agents end with denser stands than thaw agents.",
-    "Section 4.2, figure 2c",
-    FIXED,
-    note=LACK_OF_LEARNING,
-)
+@claim("Carbon agents end with denser stands than thaw agents.", "Section 4.2, figure 2c", FIXED, note=LACK_OF_LEARNING)
 def carbon_is_denser(evidence):
     apart = difference(at_the_end(evidence, CARBON, "final_density"), at_the_end(evidence, THAW, "final_density"))
     return finding([Row("stems/ha, carbon less thaw agents", "260 - 280", apart)], above(apart, least=QUARTER * 260))
@@ -309,11 +293,7 @@ def thaw_goes_deciduous(evidence):
     )
 
 
-@claim(
-    "Mixed weights lead to the highest conifer fractions.",
-    "Figure 2d",
-    FIXED,
-)
+@claim("Mixed weights lead to the highest conifer fractions.", "Figure 2d", FIXED)
 def mixed_weights_have_most_conifers(evidence):
     ends = {weight: at_the_end(evidence, weight, "final_conifer_fraction") for weight in (THAW, CARBON)}
     inner = [at_the_end(evidence, weight, "final_conifer_fraction") for weight in (0.25, 0.5, 0.75)]

@@ -89,11 +89,7 @@ def asymmetric_is_hardest(evidence):
     return finding(rows, all_of(*answers))
 
 
-@claim(
-    "Carbon is the same under all three thaw rewards: 7.8, 7.6 and 7.9.",
-    "Table 3",
-    THAW,
-)
+@claim("Carbon is the same under all three thaw rewards: 7.8, 7.6 and 7.9.", "Table 3", THAW)
 def carbon_is_the_same(evidence):
     table = paper("thaw_formulations", index_col="formulation").carbon_mean
     own = {name: formulation(evidence, name, run_numbers).carbon for name in table.index}
@@ -154,10 +150,7 @@ def asymmetric_avoids_warming(evidence):
 
 
 @claim(
-    "Agents of the asymmetric reward keep the warming flux near 0.1 MJ.",
-    "Table of thaw penalties",
-    MAIN,
-    kind=LEVEL,
+    "Agents of the asymmetric reward keep the warming flux near 0.1 MJ.", "Table of thaw penalties", MAIN, kind=LEVEL
 )
 def warming_is_small(evidence):
     flux = seeds(formulation(evidence, "asymmetric", warming)["boundary_warming_mj_m2"])

@@ -391,10 +391,7 @@ def sparsity_order(evidence):
         )
         for script in (CURRICULUM, GATED, EUPG)
     ]
-    pairs = {
-        "Curriculum less Gated": (difference, CURRICULUM, GATED),
-        "Gated less EUPG": (unpaired, GATED, EUPG),
-    }
+    pairs = {"Curriculum less Gated": (difference, CURRICULUM, GATED), "Gated less EUPG": (unpaired, GATED, EUPG)}
     rows += [
         Row(what, "above 0", optional(lambda less=less, pair=pair: less(*(sparsities(evidence, one) for one in pair))))
         for what, (less, *pair) in pairs.items()

@@ -23,16 +23,7 @@ from analysis.paper_claims.claim import (
     opposite,
     short,
 )
-from analysis.paper_claims.evidence import (
-    EUPG,
-    WITH_EUPG,
-    difference,
-    main_metrics,
-    only,
-    optional,
-    seeds,
-    unpaired,
-)
+from analysis.paper_claims.evidence import EUPG, WITH_EUPG, difference, main_metrics, only, optional, seeds, unpaired
 from analysis.paper_claims.mechanisms import gains_of
 from analysis.paper_claims.performance import CURRICULUM, GATED
 from analysis.tables.common import paper
@@ -91,11 +82,7 @@ def changes(evidence, script: str) -> tuple[list[Row], Answer]:
     ], answer
 
 
-@claim(
-    "Curriculum PPO follows the preference.",
-    "Figure 3d; table of detailed objectives",
-    only("main", "variants"),
-)
+@claim("Curriculum PPO follows the preference.", "Figure 3d; table of detailed objectives", only("main", "variants"))
 def curriculum_follows(evidence):
     rows, answer = changes(evidence, CURRICULUM)
     return finding(rows + apart_rows(evidence), answer)

@@ -156,12 +156,7 @@ def solver_share(evidence):
     return finding(rows, about(ours, 60, 70))
 
 
-@claim(
-    "An environment needs 50 to 100 MB of memory.",
-    "Appendix, runtime",
-    BENCHMARK,
-    note=FASTER,
-)
+@claim("An environment needs 50 to 100 MB of memory.", "Appendix, runtime", BENCHMARK, note=FASTER)
 def memory(evidence):
     ours = measured(evidence, "async worker")
     what = "a worker's own memory, without what it shares with the others [MB]"

@@ -21,16 +21,7 @@ from analysis.paper_claims.claim import (
     finding,
     short,
 )
-from analysis.paper_claims.evidence import (
-    EUPG,
-    WITH_EUPG,
-    difference,
-    first_and_last,
-    only,
-    optional,
-    seeds,
-    unpaired,
-)
+from analysis.paper_claims.evidence import EUPG, WITH_EUPG, difference, first_and_last, only, optional, seeds, unpaired
 from analysis.paper_claims.performance import CURRICULUM, GATED, curriculum_beats_gated
 from analysis.paper_claims.preference import APART, change, fails_to_follow
 from analysis.results import by_year
@@ -129,11 +120,7 @@ def eupg_does_little(evidence):
     return finding(rows, below(apart, 0.5, what="the ratio to random actions"))
 
 
-@claim(
-    "PPO Gated plants early and fast; stands thin naturally later.",
-    "Section 4.4, figure 4b",
-    MAIN,
-)
+@claim("PPO Gated plants early and fast; stands thin naturally later.", "Section 4.4, figure 4b", MAIN)
 def early_growth(evidence):
     curves = by_year(evidence.replicates("main", GATED), "density_stems_ha")
     decline = seeds(pd.Series(100 * (1 - curves[:, -1] / curves.max(axis=1))))
@@ -201,11 +188,7 @@ def older_deciduous(one) -> dict:
     return {"stems": last[OLDER].mean().sum()}
 
 
-@claim(
-    "Variable λ EUPG keeps most mature and old deciduous trees.",
-    "Appendix, demographics",
-    WITH_EUPG,
-)
+@claim("Variable λ EUPG keeps most mature and old deciduous trees.", "Appendix, demographics", WITH_EUPG)
 def eupg_keeps_old_trees(evidence):
     stems = {script: evidence.by_seed(older_deciduous, "main", script)["stems"] for script in FRACTIONS}
     apart = [unpaired(stems[EUPG], stems[other]) for other in (GATED, CURRICULUM)]
@@ -283,9 +266,7 @@ def gradient_dominance(evidence):
 
 
 @claim(
-    "PPO Gated and Curriculum PPO gain more carbon than Variable λ EUPG.",
-    "Appendix, individual objectives",
-    WITH_EUPG,
+    "PPO Gated and Curriculum PPO gain more carbon than Variable λ EUPG.", "Appendix, individual objectives", WITH_EUPG
 )
 def both_gain_more_carbon(evidence):
     gains = {script: gain(evidence, script, "carbon_return") for script in (GATED, CURRICULUM, EUPG)}

@@ -207,11 +207,7 @@ def main(args: Args) -> None:
     """Play and analyse, unless the table is there."""
     design = QUICK if args.quick else FULL
     path = paths.studies(args.quick) / "gradient_noise.csv"
-    settings = {
-        **design._asdict(),
-        "agent_seed": AGENT_SEED,
-        "first_seed": FIRST_SEED,
-    }
+    settings = {**design._asdict(), "agent_seed": AGENT_SEED, "first_seed": FIRST_SEED}
     if stored.is_finished(path, settings):
         print(f"{path} is finished")
         report(stored.read(path))

@@ -64,10 +64,7 @@ PAIRS = {
             boreal_env.NO_CHANGE,
         ),
     ),
-    "planting, none to 100 a year of 300 stems/ha": (
-        ({}, SPARSE, boreal_env.NO_CHANGE),
-        ({}, SPARSE, PLANT_HALF),
-    ),
+    "planting, none to 100 a year of 300 stems/ha": (({}, SPARSE, boreal_env.NO_CHANGE), ({}, SPARSE, PLANT_HALF)),
     "planting 100 a year of 300 stems/ha, deciduous to conifers": (
         ({}, SPARSE, PLANT_DECIDUOUS),
         ({}, SPARSE, PLANT_CONIFER),
@@ -166,13 +163,7 @@ def main(args: Args) -> None:
     sites, years = (2, 1) if args.quick else (args.sites, YEARS)
     folder = paths.studies(args.quick)
     path = folder / "mechanism_pairs.csv"
-    settings = {
-        "sites": sites,
-        "years": years,
-        "pairs": list(PAIRS),
-        "off": OFF,
-        "means": MEANS,
-    }
+    settings = {"sites": sites, "years": years, "pairs": list(PAIRS), "off": OFF, "means": MEANS}
     if stored.is_finished(path, settings):
         print(f"{path} is finished")
         return

@@ -352,12 +352,7 @@ def main(args: Args) -> None:
 
     make_writable("--output-dir", args.output_dir)
     make_writable("--document", args.document.parent)
-    settings = {
-        "sites": site_seeds,
-        "weathers": WEATHERS,
-        "years": YEARS,
-        "share": SHARE,
-    }
+    settings = {"sites": site_seeds, "weathers": WEATHERS, "years": YEARS, "share": SHARE}
     groups: dict[str, list[Variant]] = {}
     for variant in everything:
         groups.setdefault(variant.group, []).append(variant)

@@ -82,12 +82,7 @@ def main(args: Args) -> None:
     each, years = (2, 5) if args.quick else (EACH, YEARS)
     path = found.studies_dir / "site_warming.csv"
     seeds = [curriculum.runs[0].arguments["seed"] for curriculum in curricula]
-    settings = {
-        "seeds": seeds,
-        "each": each,
-        "years": years,
-        "samples": digest(curricula),
-    }
+    settings = {"seeds": seeds, "each": each, "years": years, "samples": digest(curricula)}
     if stored.is_finished(path, settings):
         print(f"{path} is finished")
         return

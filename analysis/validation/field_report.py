@@ -28,12 +28,7 @@ FLOOR_SOURCE = "forests near Whitehorse .92 (NICOP 2008); below air until thaw i
 DEEP_MOSS = {"conifer_mature_stems_ha": 1240.0, "biomass_kgc_m2": 3.2, "organic_layer_m": 0.25}
 INTERIOR_ALASKA = {
     name: US_PRR.site[name]
-    for name in (
-        "latitude_deg",
-        "mean_annual_temperature_c",
-        "seasonal_amplitude_c",
-        "deep_boundary_temperature_k",
-    )
+    for name in ("latitude_deg", "mean_annual_temperature_c", "seasonal_amplitude_c", "deep_boundary_temperature_k")
 }
 DEEP_MOSS_THAW = Band(0.36, 0.52)
 DEEP_MOSS_SOURCE = "Wickersham, 36 years (Viereck et al. 2008, abstract)"

@@ -71,8 +71,7 @@ AFTER_FIRE = {"after fire": Course(MATURE, mechanisms={"fire": False}, burned=Tr
 SEEDLINGS_HA, SEEDLINGS_KGC_M2 = 2000.0, 0.02
 EVEN_AGED = {
     species: Course(
-        {f"{species}_seedling_stems_ha": SEEDLINGS_HA, "biomass_kgc_m2": SEEDLINGS_KGC_M2},
-        mechanisms={"fire": False},
+        {f"{species}_seedling_stems_ha": SEEDLINGS_HA, "biomass_kgc_m2": SEEDLINGS_KGC_M2}, mechanisms={"fire": False}
     )
     for species in ("conifer", "deciduous")
 }

@@ -201,11 +201,7 @@ CHECKS = {
     "interception loss of snowfall": Check(
         "1",
         interception_loss,
-        {
-            **_for(("mature conifer",), 0.2, 0.4),
-            **_around(mature_deciduous=0.13),
-            **_for(("mature mixed",), 0.13, 0.4),
-        },
+        {**_for(("mature conifer",), 0.2, 0.4), **_around(mature_deciduous=0.13), **_for(("mature mixed",), 0.13, 0.4)},
         "Pomeroy et al. 1998: aspen 0.13 (± 25 %), conifers 0.3-0.4; Montesi et al. 2004: 0.2-0.3",
         "exposure is at its limit of 1: ventilation of intercepted snow, weak winter sun",
         "sublimation",

@@ -22,10 +22,7 @@ UNITS = {"gpp": "gC m-2 day-1", "reco": "gC m-2 day-1", "nee": "gC m-2 day-1", "
 LIKELY = {
     "gpp": ("a colder climate than any tower's", "light use is that of forests on better ground"),
     "reco": ("little soil carbon (2-10 kgC/m2) with one slow pool in a cold climate", "not looked into"),
-    "nee": (
-        "GPP too high, respiration too low, or both: see their biases",
-        "not looked into",
-    ),
+    "nee": ("GPP too high, respiration too low, or both: see their biases", "not looked into"),
     "et": ("a colder climate than any tower's; autumn rain is scarce", "not looked into"),
 }
 

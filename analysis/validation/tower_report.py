@@ -4,14 +4,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from analysis.validation import (
-    document,
-    poker_flat,
-    tower_comparison,
-    tower_figures,
-    tower_stands,
-    towers,
-)
+from analysis.validation import document, poker_flat, tower_comparison, tower_figures, tower_stands, towers
 from analysis.validation.document import Miss, Part, number, percent
 from analysis.validation.scores import skill
 from analysis.validation.tower_comparison import QUANTITIES

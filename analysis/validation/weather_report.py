@@ -50,11 +50,7 @@ STATISTICS = {
     ),
     "persistence": Statistic("lag-1 autocorrelation of it", "1", 0.1, False, "one value for all seasons"),
     "precipitation": Statistic(
-        "precipitation",
-        "mm day-1",
-        0.25,
-        True,
-        "the paper's wet-day probabilities and amounts",
+        "precipitation", "mm day-1", 0.25, True, "the paper's wet-day probabilities and amounts"
     ),
     "wet days": Statistic("wet days (1 mm and more)", "1", 0.25, True, "the paper's probabilities of a wet day"),
     "wet amount": Statistic("mean amount of a wet day", "mm", 0.25, True, "the paper's amounts of a wet day", 1),
