@@ -276,21 +276,9 @@ def training(args: Args, stack: ExitStack) -> list[Measurement]:
 
     def measure(kind, number, groups):
         with tempfile.TemporaryDirectory() as folder:
-            command = [
-                sys.executable,
-                ROOT / "cleanrl_style" / "ppo_curriculum.py",
-                "--vectorization",
-                kind,
-                "--total-timesteps",
-                steps,
-                "--eval-episodes",
-                2 if args.quick else 32,
-                "--eval-weights",
-                0,
-                1,
-                "--run-dir",
-                folder,
-            ]
+            command = [sys.executable, ROOT / "cleanrl_style" / "ppo_curriculum.py", "--vectorization", kind]
+            command += ["--total-timesteps", steps, "--eval-episodes", 2 if args.quick else 32]
+            command += ["--eval-weights", 0, 1, "--run-dir", folder]
             subprocess.run([str(word) for word in command], check=True, capture_output=True)
             timing = pd.read_csv(Path(folder) / "timing.csv")
             played = boreal_env.DEFAULT_YEARS * len(pd.read_csv(Path(folder) / "evaluation.csv"))

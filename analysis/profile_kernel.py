@@ -22,6 +22,7 @@ from numba.core.dispatcher import Dispatcher
 from analysis.benchmark import per_step, started
 from analysis.machine import machine
 from analysis.paths import make_writable
+from boreal_env import NO_CHANGE
 from cleanrl_style import protocol
 from sim.account import clear_day, end_day
 from sim.block import LANES, filled_block
@@ -43,7 +44,6 @@ MOMENTS = {  # name -> (day, step of the day)
     "summer night": (190, 2),
     "summer noon": (190, 24),
 }
-NO_CHANGE = 12  # the action that leaves a stand alone
 COPIES = 4  # of the block, taken in turn, so that the compiler cannot do once what is to be done every time
 CALLS = 400
 DAYS = (begin_day, clear_day, end_day)  # once a day

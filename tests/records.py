@@ -17,7 +17,7 @@ POKER_FLAT = ROOT / "analysis" / "observations" / "US-Prr_2011-2014_daily.csv.gz
 @functools.cache
 def measured() -> pd.DataFrame:
     """Svartberget's weather as the validation reads it, by local solar time."""
-    tower = towers.find("SE-Svb")
+    tower = towers.SE_SVB
     return towers.forcing(towers.read(tower), tower)
 
 

@@ -11,7 +11,7 @@ from analysis.validation import towers
 
 @pytest.fixture(scope="module")
 def tower():
-    return towers.find("SE-Svb")
+    return towers.SE_SVB
 
 
 @pytest.fixture(scope="module")
@@ -103,8 +103,3 @@ def test_leap_day_is_left_out(tower):
     weather = towers.forcing(pd.DataFrame(1.0, index=stamps, columns=columns), tower)
     assert len(weather) == 365 * 48
     assert not ((weather.index.month == 2) & (weather.index.day == 29)).any()
-
-
-def test_unknown_site_names_those_allowed():
-    with pytest.raises(ValueError, match="unknown site 'SE-Nor'; allowed: SE-Svb"):
-        towers.find("SE-Nor")

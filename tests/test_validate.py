@@ -19,11 +19,9 @@ from analysis.validation import (
     tower_report,
     weather_report,
 )
-from analysis.validation.held_stands import KINDS, hold
+from analysis.validation.held_stands import KINDS, UNDISTURBED, hold
 from analysis.validation.scores import Band
 from sim.parameters import CONSTANTS
-
-UNDISTURBED = {"fire": False, "insects": False}
 
 
 @pytest.fixture(scope="module")

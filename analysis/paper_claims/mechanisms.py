@@ -27,7 +27,7 @@ from analysis.paper_claims.claim import (
 from analysis.paper_claims.evidence import FRONTS, difference, mean_of, only, optional, seeds
 from analysis.studies.mechanism_pairs import ALL_ON, PAIRS, effects
 from analysis.tables.common import paper
-from analysis.tables.growing_season_correlations import SEASON_PAIRS, correlations
+from analysis.tables.growing_season_correlations import SEASON_PAIRS, VARIABLES, correlations
 from analysis.tables.thaw_formulations import asymmetric_numbers, replicates_of, run_numbers
 
 TITLE = "Physics and mechanisms"
@@ -175,11 +175,7 @@ def correlation(by_seed: pd.Series, sites: int) -> Number:
 def correlation_claim(variable: str, statement: str, why: str):
     """The claim on a correlation with the growing season, by the paper's definition: days between leaf dates."""
     papers = paper("growing_season_correlations", index_col="variable").r
-    name = {
-        "thaw_return": "thaw_reward",
-        "latent_heat_mj_m2": "latent_heat",
-        "ground_shortwave_mj_m2": "ground_radiation",
-    }[variable]
+    name = VARIABLES[variable]
 
     @claim(
         statement,

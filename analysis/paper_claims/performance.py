@@ -91,11 +91,7 @@ def value_claim(script: str):
         rows = [
             Row("scalarised return", short(papers), ours),
             Row("the same less zero change, same episodes", "", gain),
-            Row(
-                "share of the site in the variance of thaw returns (`analysis/studies/variance.py`)",
-                "",
-                optional(lambda: share(evidence, "thaw", "site")),
-            ),
+            site_share(evidence),
         ]
         return finding(rows, about(ours, papers))
 
@@ -480,6 +476,12 @@ def net_cooling(one) -> dict:
     return {"cooling": (means.boundary_cooling_mj_m2 - means.boundary_warming_mj_m2).min()}
 
 
+def site_share(evidence) -> Row:
+    """How much of what thaw returns vary with is the site."""
+    what = "share of the site in the variance of thaw returns (`analysis/studies/variance.py`)"
+    return Row(what, "", optional(lambda: share(evidence, "thaw", "site")))
+
+
 def lowest_thaw(one) -> dict:
     """The lowest mean thaw return of any weight."""
     return {"lowest": metrics.mean_returns(one.evaluation).thaw_return.min()}
@@ -503,14 +505,7 @@ def curriculum_scatters_less(evidence):
         )
         for script in scatter
     ]
-    rows.append(Row("Curriculum over Gated", "0.5", ratio))
-    rows.append(
-        Row(
-            "share of the site in the variance of thaw returns (`analysis/studies/variance.py`)",
-            "",
-            optional(lambda: share(evidence, "thaw", "site")),
-        )
-    )
+    rows += [Row("Curriculum over Gated", "0.5", ratio), site_share(evidence)]
     return finding(rows, below(ratio, 1.0, least=QUARTER * 0.5, what="the ratio"))
 
 

@@ -45,11 +45,6 @@ def most(name: str) -> float:
     return paper("runtime", index_col="quantity").high[name]
 
 
-def training_hours(run) -> float:
-    """Hours of a run's rollouts and updates."""
-    return hours(run)["training"]
-
-
 @claim("A 50-year episode takes 5 to 7 s on one core (Numba).", "Appendix, runtime", BENCHMARK, note=FASTER)
 def episode(evidence):
     name = "episode_50_years_numba"
@@ -79,7 +74,7 @@ def training_claim(statement: str, command: str, experiment: str, script: str, n
 
     @claim(statement, "Appendix, runtime", command, note=FASTER)
     def training(evidence):
-        values = [training_hours(run) for one in evidence.replicates(experiment, script) for run in one.runs]
+        values = [hours(run)["training"] for one in evidence.replicates(experiment, script) for run in one.runs]
         ours = seeds(pd.Series(values))
         steps = evidence.job(experiment, script).steps
         method = {"eupg": "EUPG", "ppo": "PPO"}[script.split("_")[0]]

@@ -21,6 +21,7 @@ import sim
 from analysis import paths, stored
 from analysis.studies import open_loop, sensitivity
 from analysis.studies.sensitivity import DEFAULT, Variant
+from analysis.validation.held_stands import UNDISTURBED
 from cleanrl_style import protocol
 from sim.stands import available_cores
 from sim.task.episodes import BALANCED_WORLD
@@ -29,7 +30,6 @@ YEARS = 50
 SITES = 5  # with three plans they fill a block of sixteen lanes
 PLANS = {"zero change": 12, "conifers": 24, "deciduous": 20}
 WORLDS = {"boreal-generalist-v0": {}, "boreal-balanced-v0": BALANCED_WORLD}
-UNDISTURBED = {"fire": False, "insects": False}
 
 
 @dataclass

@@ -3,13 +3,12 @@
 import numpy as np
 
 import sim
-from analysis.validation.held_stands import NO_CHANGE
+from analysis.validation.held_stands import NO_CHANGE, UNDISTURBED
 from sim.spin_up import BOUNDARY
 from sim.stands import HELD_COLUMNS
 from sim.state import PARAMETER_NAMES
 
 YEARS = 10
-UNDISTURBED = {"fire": False, "insects": False}
 
 
 def run_held(sites: list[dict], seeds: list, **world) -> tuple[np.ndarray, ...]:

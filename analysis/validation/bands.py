@@ -4,7 +4,7 @@ import numpy as np
 
 from analysis.validation import document
 from analysis.validation.document import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, Miss, Part, number, percent
-from analysis.validation.held_stands import KINDS, Run, hold
+from analysis.validation.held_stands import KINDS, UNDISTURBED, Run, hold
 from analysis.validation.observed_bands import ALL, CHECKS, FELLED, WARMING, Check
 from analysis.validation.scores import IN, Band
 from boreal_env import BALANCED_WORLD
@@ -12,7 +12,6 @@ from boreal_env import BALANCED_WORLD
 SKIPPED_YEARS = 7
 KEPT_YEARS = 5
 FOREST = "mature conifer"
-UNDISTURBED = {"fire": False, "insects": False}
 COLOURS = dict(zip(ALL, (BLUE, ORANGE, GREEN, SKY, PURPLE, BLACK), strict=True))
 SHORT = dict(zip(ALL, ("conifer", "deciduous", "mixed", "young", "old", "open"), strict=True))
 
@@ -110,7 +109,7 @@ def _limits(check: Check, samples: dict[str, np.ndarray]) -> str:
     """The band, or one for each kind of stand in `samples` where they differ."""
     bands = {kind: band for kind, band in check.bands.items() if kind in samples}
     digits = max(_digits(check, kind, samples[kind]) for kind in bands)
-    texts = {kind: f"{number(band.low, digits)} .. {number(band.high, digits)}" for kind, band in bands.items()}
+    texts = {kind: document.limits(band, digits) for kind, band in bands.items()}
     if len(set(texts.values())) == 1:
         return next(iter(texts.values()))
     return "; ".join(f"{SHORT[kind]} {text}" for kind, text in texts.items())
@@ -125,14 +124,13 @@ def _cell(check: Check, kind: str, samples: dict[str, np.ndarray]) -> str:
     if kind not in samples:
         return "-"
     digits = _digits(check, kind, samples[kind])
-    low, median, high = (number(value, digits) for value in np.percentile(samples[kind], [10, 50, 90]))
-    text = f"{median} ({low} .. {high})"
+    text = document.spread(samples[kind], digits)
     return f"{text} {_verdict(check.bands[kind], samples[kind])}" if kind in check.bands else text
 
 
 def _verdict(band: Band, sample: np.ndarray) -> str:
     verdict = band.verdict(float(np.median(sample)))
-    return f"{verdict if verdict == IN else f'**{verdict}**'}, {percent(band.share_within(sample))}"
+    return f"{document.marked(verdict)}, {percent(band.share_within(sample))}"
 
 
 def _miss(name: str, check: Check, kind: str, sample: np.ndarray, where: str) -> list[Miss]:
@@ -141,7 +139,7 @@ def _miss(name: str, check: Check, kind: str, sample: np.ndarray, where: str) ->
     if verdict == IN:
         return []
     digits = _digits(check, kind, sample)
-    limits = f"{number(band.low, digits)} .. {number(band.high, digits)}"
+    limits = document.limits(band, digits)
     likely = check.low if "low" in verdict else check.high
     return [Miss(where, f"{name}: median {number(median, digits)}, band {limits}", likely)]
 

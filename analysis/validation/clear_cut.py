@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 import sim
-from analysis.validation.held_stands import NO_CHANGE
+from analysis.validation.held_stands import NO_CHANGE, UNDISTURBED
 from sim.stands import HELD_COLUMNS
 from sim.state import DAILY_NAMES, STATE, STATE_NAMES
 
 YEARS_BEFORE, YEARS_AFTER = 3, 3
 MAY_TO_AUGUST = slice(120, 243)  # of the days of a year
-UNDISTURBED = {"fire": False, "insects": False}
 
 #: Central Yakutia: the mean annual temperature is that of SRDB's Yakutsk stands; half-range and permafrost, from the
 #: climate normals and boreholes, are from memory. Leaf area about 2.5 at the cover of 1500 stems; biomass of the larch

@@ -72,7 +72,7 @@ def _era_interim() -> Climate:
 
 
 def _svartberget() -> Climate:
-    tower = towers.find("SE-Svb")
+    tower = towers.SE_SVB
     weather = towers.forcing(towers.read(tower), tower)
     vapour = weather["relative_humidity"] * saturation(weather["air_temperature_c"])
     days = weather.assign(vapour_pressure_hpa=vapour).resample("D").mean()

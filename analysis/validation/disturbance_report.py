@@ -7,7 +7,7 @@ import numpy as np
 import sim
 from analysis.validation import climate_records, document
 from analysis.validation.document import Miss, Part, number, percent
-from analysis.validation.held_stands import KINDS, Run, hold
+from analysis.validation.held_stands import KINDS, UNDISTURBED, Run, hold
 from analysis.validation.scores import IN, Band, poisson_interval
 from sim.parameters import CONSTANTS
 from sim.state import DAYS
@@ -20,7 +20,6 @@ KINDS_SHOWN = {
     "as episodes start": {},  # everything drawn: 0-600 stems/ha, 0.2-0.8 of them conifers
 }
 JUDGED = ("mature conifer", "mature mixed")
-UNDISTURBED = {"fire": False, "insects": False}
 DAILY = ("air_temperature_c", "precipitation_mm", "swe_mm")
 drought_index_of = np.vectorize(climate_records.uncompiled(drought_index))
 #: Densities [stems ha-1] at which mortality is measured, by species; at the first no stand thins itself.
@@ -210,11 +209,11 @@ def _row(
     if band is None:
         return [name, kind, number(value, digits) + spread, "", "", ""]
     digits, verdict = band.digits(value, digits), band.verdict(value)
-    limits = f"{number(band.low, digits)} .. {number(band.high, digits)}"
+    limits = document.limits(band, digits)
     if verdict != IN:
         misses.append(Miss(kind, f"{name}: {number(value, digits)}, literature {limits}", LIKELY[source]))
     text = number(value, digits) + spread
-    shown = verdict if verdict == IN else f"**{verdict}**"
+    shown = document.marked(verdict)
     if verdict == IN and source in (*INPUT, *CALIBRATED):
         shown = "input" if source in INPUT else "in, calibrated"
     return [name, kind, text, limits, shown, SOURCES[source]]

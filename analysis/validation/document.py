@@ -5,9 +5,12 @@ import textwrap
 from dataclasses import dataclass, field
 
 import matplotlib.style
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
+
+from analysis.validation.scores import IN, Band
 
 #: Colours that people with any colour vision can tell apart (Okabe and Ito 2008).
 BLACK, GREY = "#222222", "#9a9a9a"
@@ -60,6 +63,22 @@ def number(value: float, digits: int = 2, sign: bool = False) -> str:
 def percent(share: float) -> str:
     """A share in per cent."""
     return f"{100.0 * share:.0f} %"
+
+
+def spread(values, digits: int = 2, ends: tuple[float, float] = (10.0, 90.0)) -> str:
+    """Median and two percentiles of a sample."""
+    low, median, high = (number(value, digits) for value in np.percentile(values, [ends[0], 50.0, ends[1]]))
+    return f"{median} ({low} .. {high})"
+
+
+def limits(band: Band, digits: int) -> str:
+    """A band's ends."""
+    return f"{number(band.low, digits)} .. {number(band.high, digits)}"
+
+
+def marked(verdict: str) -> str:
+    """A verdict of a band, bold where it misses."""
+    return verdict if verdict == IN else f"**{verdict}**"
 
 
 def fill(text: str) -> str:

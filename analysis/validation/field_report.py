@@ -4,12 +4,11 @@ import numpy as np
 
 from analysis.validation import clear_cut, document
 from analysis.validation.document import Miss, Part, number
-from analysis.validation.held_stands import KINDS, Run, hold
+from analysis.validation.held_stands import KINDS, UNDISTURBED, Run, hold
 from analysis.validation.scores import IN, Band
 from analysis.validation.tower_stands import US_PRR
 
 SKIPPED_YEARS, KEPT_YEARS = 7, 3
-UNDISTURBED = {"fire": False, "insects": False}
 TEMPERATURES = ("air_temperature_c", "ground_temperature_c", "soil_top_temperature_c")
 WINDS = (1.0, 2.0, 3.0)
 JUDGED_WIND = 2.0
@@ -131,12 +130,11 @@ def _add(
     """Add a row to a table, and a miss to `misses` if the median is outside the band."""
     median = float(np.median(values))
     digits = band.digits(median, digits) if band else digits
-    low, middle, high = (number(value, digits) for value in np.percentile(values, [10, 50, 90]))
-    cell = f"{middle} ({low} .. {high})"
+    cell = document.spread(values, digits)
     if band is None:
         rows.append([name, stand, cell, "", "", ""])
         return
-    limits, verdict = f"{number(band.low, digits)} .. {number(band.high, digits)}", band.verdict(median)
-    rows.append([name, stand, cell, limits, verdict if verdict == IN else f"**{verdict}**", source])
+    limits, verdict = document.limits(band, digits), band.verdict(median)
+    rows.append([name, stand, cell, limits, document.marked(verdict), source])
     if verdict != IN:
-        misses.append(Miss(stand, f"{name}: median {middle}, observed {limits}", SUMMER))
+        misses.append(Miss(stand, f"{name}: median {number(median, digits)}, observed {limits}", SUMMER))

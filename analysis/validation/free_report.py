@@ -121,7 +121,7 @@ def report(sites: int) -> Part:
     checks, check_misses = _checks({**episodes, **balanced}, unburned, table)
     unit = ", ".join(f"{name} [{quantity.unit}]" for name, quantity in QUANTITIES.items())
     left_alone = "; ".join(
-        f"{kind}: {', '.join(number(_at(episodes[kind], 'biomass', year)[1], 1) for year in SHOWN_YEARS)} kgC/m2"
+        f"{kind}: {', '.join(number(np.median(_at(episodes[kind], 'biomass', y)), 1) for y in SHOWN_YEARS)} kgC/m2"
         for kind in LEFT_ALONE
     )
     text = f"""{sites} sites drawn as for episodes of the environment; {STAND_YEARS} years of weather as generated,
@@ -179,20 +179,15 @@ def course_of(run: Run, name: str) -> np.ndarray:
 
 
 def _at(run: Run, name: str, year: int) -> np.ndarray:
-    """10, 50 and 90 % of the sites in a year, counted from 1."""
-    return np.percentile(course_of(run, name)[year - 1], [10, 50, 90])
-
-
-def _spread(values: np.ndarray, digits: int) -> str:
-    low, median, high = (number(value, digits) for value in values)
-    return f"{median} ({low} .. {high})"
+    """A quantity of the sites in a year, counted from 1."""
+    return course_of(run, name)[year - 1]
 
 
 def _by_year(episodes: dict[str, Run]) -> list[list[str]]:
     rows = []
     for kind, run in episodes.items():
         for year in SHOWN_YEARS:
-            cells = [_spread(_at(run, name, year), quantity.digits) for name, quantity in QUANTITIES.items()]
+            cells = [document.spread(_at(run, name, year), quantity.digits) for name, quantity in QUANTITIES.items()]
             rows.append([kind if year == 1 else "", str(year), *cells])
     return rows
 
@@ -206,17 +201,19 @@ def _by_age(even_aged: dict[str, Run], table: pd.DataFrame) -> tuple[list[list[s
                 if band is None:
                     continue
                 values = _at(run, name, age)
+                median = float(np.median(values))
                 quantity = QUANTITIES[name]
-                digits = band.digits(float(values[1]), quantity.digits)
-                verdict = _verdict(band, values[1])
-                limits = _limits(band, digits)
+                digits = band.digits(median, quantity.digits)
+                verdict = band.verdict(median)
+                limits = document.limits(band, digits)
                 stands = stand_development.about(table, species, name, age)
                 sources = ", ".join(dict.fromkeys(stands.source))
                 label = f"{name} [{quantity.unit}]"
-                rows.append([species, label, str(age), _spread(values, digits), limits, verdict, sources])
+                cells = [document.spread(values, digits), limits, document.marked(verdict), sources]
+                rows.append([species, label, str(age), *cells])
                 if verdict != IN:
                     likely = quantity.low if "low" in verdict else quantity.high
-                    what = f"{name} at {age} years: median {number(values[1], digits)}, observed {limits}"
+                    what = f"{name} at {age} years: median {number(median, digits)}, observed {limits}"
                     misses.append(Miss(f"even-aged {species}", what, likely))
     return rows, misses
 
@@ -228,9 +225,9 @@ def _checks(
     rows, misses = [], []
 
     def check(name, kind, value, band, digits, source, low, high, spread="", calibrated=False):
-        digits, verdict = band.digits(value, digits), _verdict(band, value)
-        limits = _limits(band, digits)
-        shown = "in, calibrated" if verdict == IN and calibrated else verdict
+        digits, verdict = band.digits(value, digits), band.verdict(float(value))
+        limits = document.limits(band, digits)
+        shown = "in, calibrated" if verdict == IN and calibrated else document.marked(verdict)
         rows.append([name, kind, number(value, digits) + spread, limits, shown, source])
         if verdict != IN:
             likely = low if "low" in verdict else high
@@ -276,15 +273,6 @@ def growth(table: pd.DataFrame, spans: tuple[tuple[int, int], ...]) -> Band:
 def _growth_source(spans: tuple[tuple[int, int], ...]) -> str:
     ages = " and ".join(f"{start} to {end}" for start, end in spans)
     return f"Manitoba black spruce, wet and dry, from {ages} years (Wang et al. 2003)"
-
-
-def _verdict(band: Band, value: float) -> str:
-    verdict = band.verdict(float(value))
-    return verdict if verdict == IN else f"**{verdict}**"
-
-
-def _limits(band: Band, digits: int) -> str:
-    return f"{number(band.low, digits)} .. {number(band.high, digits)}"
 
 
 @document.styled

@@ -13,6 +13,7 @@ import sim
 from sim.stands import HELD_COLUMNS
 from sim.state import DAILY_NAMES, DAYS
 
+UNDISTURBED = {"fire": False, "insects": False}
 NO_CHANGE = 10  # action 5 * 2 + 0: density index 2 leaves the stand alone
 MONTH = pd.date_range("2001-01-01", periods=DAYS).month.to_numpy()  # of each day of a year without leap day
 

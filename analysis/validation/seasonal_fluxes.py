@@ -7,7 +7,7 @@ import pandas as pd
 
 from analysis.validation import document, forest_towers
 from analysis.validation.document import BLACK, BLUE, GREY, ORANGE, Miss, Part, number, percent
-from analysis.validation.held_stands import KINDS, Run, hold
+from analysis.validation.held_stands import KINDS, UNDISTURBED, Run, hold
 from analysis.validation.scores import skill
 
 CONIFER, DECIDUOUS = "mature conifer", "mature deciduous"
@@ -15,7 +15,6 @@ KINDS_SHOWN = {CONIFER: BLUE, DECIDUOUS: ORANGE}
 YEARS = 5
 TOLERANCE = 0.2
 MARGIN = 0.05
-UNDISTURBED = {"fire": False, "insects": False}
 FLUXES = {"gpp": "GPP", "reco": "ecosystem respiration", "nee": "NEE, uptake negative", "et": "evapotranspiration"}
 UNITS = {"gpp": "gC m-2 day-1", "reco": "gC m-2 day-1", "nee": "gC m-2 day-1", "et": "mm day-1"}
 #: What likely is behind a flux below and above the towers'.

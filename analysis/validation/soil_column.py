@@ -32,39 +32,8 @@ NO_POLICY = "zero change"  # what the others' effects are differences from
 STEP_MINUTES = (5, 30, 60, 120)
 BOUNDARY_DEPTHS_M = (10.0, 12.0, 15.0, 20.0)
 TALIK_M = 2.0  # mean depth of thaw beyond which a stand is not counted in the active layer's error
-LAYER_EDGES_M = (
-    0.0,
-    0.05,
-    0.1,
-    0.15,
-    0.2,
-    0.25,
-    0.3,
-    0.4,
-    0.5,
-    0.6,
-    0.7,
-    0.8,
-    0.9,
-    1.0,
-    1.1,
-    1.25,
-    1.4,
-    1.7,
-    2.0,
-    2.5,
-    3.0,
-    3.5,
-    4.0,
-    5.0,
-    6.0,
-    7.0,
-    8.0,
-    9.0,
-    10.0,
-    11.0,
-    12.0,
-)
+LAYER_EDGES_M = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4, 1.7)
+LAYER_EDGES_M += (2.0, 2.5, 3.0, 3.5, *map(float, range(4, 13)))
 SURFACE_DEPTH, DEEP_NODE, BOUNDARY = (
     CONSTANTS[name].low for name in ("surface_soil_depth_m", "deep_soil_node_m", "boundary_depth_m")
 )

@@ -9,6 +9,7 @@ import functools
 import numpy as np
 
 import sim
+from boreal_env import NO_CHANGE
 from sim.account import clear_day, end_day
 from sim.block import filled_block
 from sim.day import begin_day
@@ -20,8 +21,6 @@ from sim.spin_up import climate_draws
 from sim.state import DAYS, DRAWS, daily_dtype
 from sim.step import simulate_step
 from sim.year import begin_year, end_year
-
-NO_CHANGE = 12
 
 
 @phase

@@ -66,7 +66,7 @@ class Comparison:
 
 def svartberget(repeats: int) -> Comparison:
     """SE-Svb 2019 in half-hours, the year run `repeats` times."""
-    tower = towers.find("SE-Svb")
+    tower = towers.SE_SVB
     record = towers.read(tower)
     forcing = towers.forcing(record, tower)
     fluxes = towers.daily_fluxes(towers.fluxes(record, tower))

@@ -69,15 +69,6 @@ SE_SVB = Tower(
     },
 )
 
-TOWERS = {tower.site: tower for tower in (SE_SVB,)}
-
-
-def find(site: str) -> Tower:
-    """The tower of this name. Raises ValueError, with the names that are allowed, if there is none."""
-    if site not in TOWERS:
-        raise ValueError(f"unknown site {site!r}; allowed: {', '.join(TOWERS)}")
-    return TOWERS[site]
-
 
 def read_table(file: str) -> pd.DataFrame:
     """A table of `analysis/observations`, packed or not, column for column."""

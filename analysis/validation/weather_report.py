@@ -9,7 +9,7 @@ import pandas as pd
 from analysis.validation import calibration, climate_records, document, forest_towers
 from analysis.validation.climate_records import SEASONS, Climate
 from analysis.validation.document import BLACK, BLUE, GREEN, ORANGE, PURPLE, Miss, Part, number
-from analysis.validation.held_stands import KINDS, MONTH, Run, hold
+from analysis.validation.held_stands import KINDS, MONTH, UNDISTURBED, Run, hold
 from sim.parameters import CONSTANTS, WEATHERS
 from sim.physical_constants import MJ_PER_DAY
 from sim.state import DAYS
@@ -17,7 +17,6 @@ from sim.weather import snow_share
 
 MISS = "**MISS**"
 YEARS = 6
-UNDISTURBED = {"fire": False, "insects": False}
 DAILY = ("air_temperature_c", "precipitation_mm", "shortwave_mj_m2")
 #: ERA-Interim 1989-2014 at US-Prr: mean and first harmonic of daily temperature.
 US_PRR_CLIMATE = {"latitude_deg": 65.124, "mean_annual_temperature_c": -2.9, "seasonal_amplitude_c": 19.6}
@@ -204,11 +203,11 @@ def _table(here, there, as_observed, towers, forests) -> tuple[list[list[str]], 
                 [
                     f"{statistic.label} [{statistic.unit}]" if statistic.unit != "1" else statistic.label,
                     season,
-                    _spread(sampled[season], digits),
+                    document.spread(sampled[season], digits),
                     *(number(value, digits) for value in generated.values()),
                     number(era, digits),
                     number(tower, digits),
-                    "-" if forest is None else _range(forest, digits),
+                    "-" if forest is None else document.spread(forest, digits, (0.0, 100.0)),
                     *verdicts,
                 ]
             )
@@ -231,7 +230,7 @@ def _verdict(name: str, season: str, world: str, within: bool) -> str:
 def _snowfall_row(generated: list[np.ndarray], records: dict[str, Climate]) -> list[str]:
     era, tower = (number(snowfall(records[name]), 0) for name in ("ERA-Interim", "US-Prr"))
     alike, varying = (number(float(np.median(values)), 0) for values in generated[1:])
-    return ["snowfall [mm yr-1]", "year", _spread(generated[0], 0), alike, varying, era, tower, "-", "", ""]
+    return ["snowfall [mm yr-1]", "year", document.spread(generated[0], 0), alike, varying, era, tower, "-", "", ""]
 
 
 def _forests() -> dict[str, dict[str, pd.Series]]:
@@ -243,16 +242,6 @@ def _forests() -> dict[str, dict[str, pd.Series]]:
         course = months[column].unstack().dropna().to_numpy()
         found[name] = by_season(course if column == "tair" else course / DAYS_OF_MONTH)
     return found
-
-
-def _spread(values: np.ndarray, digits: int) -> str:
-    low, median, high = (number(value, digits) for value in np.percentile(values, [10, 50, 90]))
-    return f"{median} ({low} .. {high})"
-
-
-def _range(values: np.ndarray, digits: int) -> str:
-    low, median, high = (number(value, digits) for value in np.percentile(values, [0, 50, 100]))
-    return f"{median} ({low} .. {high})"
 
 
 def _by_month(days: np.ndarray) -> np.ndarray:

@@ -238,11 +238,16 @@ def _times_of(days: pd.DatetimeIndex) -> pd.DatetimeIndex:
     return pd.DatetimeIndex(np.concatenate([day + steps for day in days]), name="time")
 
 
-def sun_shape(days: pd.DatetimeIndex, latitude_deg: float) -> np.ndarray:
-    """Shortwave of each half-hour relative to the day's mean, (days, 48): the sine of the sun's height."""
+def sun_height(days: pd.DatetimeIndex, latitude_deg: float) -> np.ndarray:
+    """Sine of the sun's height in each half-hour, 0 below the horizon, (days, 48)."""
     latitude = math.radians(latitude_deg)
     tilt = np.array([declination(day - 1) for day in days.day_of_year])[:, None]
     angle = 2.0 * math.pi * (HOURS - 12.0) / 24.0
-    height = np.maximum(math.sin(latitude) * np.sin(tilt) + math.cos(latitude) * np.cos(tilt) * np.cos(angle), 0.0)
+    return np.maximum(math.sin(latitude) * np.sin(tilt) + math.cos(latitude) * np.cos(tilt) * np.cos(angle), 0.0)
+
+
+def sun_shape(days: pd.DatetimeIndex, latitude_deg: float) -> np.ndarray:
+    """Shortwave of each half-hour relative to the day's mean, (days, 48): the sine of the sun's height."""
+    height = sun_height(days, latitude_deg)
     mean = height.mean(axis=1, keepdims=True)
     return np.where(mean > 0.0, height / np.where(mean > 0.0, mean, 1.0), 1.0)

@@ -5,13 +5,11 @@ sunlight falls short of a clear day's (Crawford and Duchon 1999, Eqs. 8 and 11),
 (Allen et al. 1998, FAO-56, Eq. 37). Days with hardly any sun have clouds between those of the days before and after.
 """
 
-import math
-
 import numpy as np
 import pandas as pd
 
 from sim import radiation
-from sim.io.disaggregation import HOURS, declination
+from sim.io.disaggregation import sun_height
 from sim.jit import uncompiled
 from sim.physical_constants import FREEZING_POINT_K, SOLAR_CONSTANT
 from sim.weather import sky_emissivity, solar_distance_factor
@@ -25,12 +23,8 @@ LEAST_SUN_W_M2 = 20.0  # extraterrestrial, of a day that tells of its clouds
 
 def extraterrestrial(days: pd.DatetimeIndex, latitude_deg: float) -> np.ndarray:
     """Daily mean shortwave at the top of the atmosphere [W m-2]."""
-    latitude = math.radians(latitude_deg)
-    tilt = np.array([declination(day - 1) for day in days.day_of_year])[:, None]
     distance = np.array([distance_factor(day - 1) for day in days.day_of_year])
-    angle = 2.0 * math.pi * (HOURS - 12.0) / 24.0
-    height = math.sin(latitude) * np.sin(tilt) + math.cos(latitude) * np.cos(tilt) * np.cos(angle)
-    return SOLAR_CONSTANT * distance * np.maximum(height, 0.0).mean(axis=1)
+    return SOLAR_CONSTANT * distance * sun_height(days, latitude_deg).mean(axis=1)
 
 
 def cloud_cover(days: pd.DatetimeIndex, shortwave: np.ndarray, latitude_deg: float) -> np.ndarray:
