@@ -15,8 +15,8 @@ class ResumableToyEnv(ToyEnv):
     "nan number": that step's reward is NaN. TOY_SECONDS: what each step takes.
     """
 
-    def __init__(self, with_site: bool = True):
-        super().__init__(with_site)
+    def __init__(self, with_site: bool = True, offset: float = 0.0):
+        super().__init__(with_site, offset)
         self.lives = {"step": 0, "mask": 0, "nan": 0, "making": 0}
         if multiprocessing.parent_process() is not None and self._fails("making"):
             raise FloatingPointError("no ground to stand on")
@@ -55,3 +55,4 @@ class ResumableToyEnv(ToyEnv):
 
 
 gym.register("resumable-toy-v0", entry_point="resumable_toy:ResumableToyEnv")
+gym.register("shifted-toy-v0", entry_point="resumable_toy:ResumableToyEnv", kwargs={"offset": 0.5})

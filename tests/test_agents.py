@@ -21,9 +21,9 @@ TOY = "toy_env:toy-v0"
 SCRIPTS = ("ppo_gated", "ppo_curriculum", "eupg_var_lambda", "eupg_fixed_lambda")
 
 
-def train(path, folder):
+def train(path, folder, *more):
     given = ("--env-id", TOY, "--total-timesteps", 80, "--num-envs", 2, "--eval-episodes", 2, "--run-dir", folder)
-    run_script(path, *given, *(("--rollout-steps", 40) if "ppo" in str(path) else ()))
+    run_script(path, *given, *(("--rollout-steps", 40) if "ppo" in str(path) else ()), *more)
 
 
 def evaluate_again(folder, policy):
@@ -37,6 +37,20 @@ def test_a_loaded_agent_plays_the_evaluation_again(script, tmp_path):
     train(f"cleanrl_style/{script}.py", tmp_path)
     evaluate_again(tmp_path, protocol.load_policy(tmp_path))
     assert own_script(tmp_path) is None  # it is imported, not read a second time
+
+
+@pytest.mark.parametrize("script", [*SCRIPTS, "ppo_group"])
+def test_training_moves_every_layer(script, tmp_path):
+    more = ("--minibatch-size", 10, *(("--group-size", 2) if script == "ppo_group" else ())) if "ppo" in script else ()
+    for rate in (1e-3, 1e-12):
+        train(f"cleanrl_style/{script}.py", tmp_path / str(rate), "--learning-rate", rate, *more)
+    trained, first = (
+        torch.load(tmp_path / str(rate) / "policy.pt", weights_only=True)["agent"] for rate in (1e-3, 1e-12)
+    )
+    layers = [name for name in first if name.startswith("actor")]
+    assert len(layers) == 6
+    for name in layers:
+        assert (trained[name] - first[name]).abs().max() > 1e-5, name
 
 
 def test_the_agent_of_a_script_elsewhere(tmp_path):

@@ -41,6 +41,7 @@ HEAVY_STORES = (
 )
 WATER_STORES = ("swe", "canopy_snow", "canopy_rain", "organic_water", "soil_water")
 NEVER_NEGATIVE = (*HEAVY_STORES, *WATER_STORES, "organic_depth", "trunk_capacity", "drought", "albedo")
+OFTEN_STRUCK = {"fire_base_probability": 0.05, "fire_drought_threshold": 5.0, "insect_base_probability": 1.0}
 MAY_BE_NAN = {"summer_albedo", "winter_albedo"}  # where no light arrives in the season
 
 
@@ -62,6 +63,8 @@ def run(request):
     limits, how, minutes, number = CASES[request.param]
     generator = np.random.default_rng(20260101)
     sites = [draw_site(generator, limits, how) for _ in range(number)]
+    for site in sites[1::3]:
+        site.update(OFTEN_STRUCK)
     # Every third stand starts from a corner of the physical limits of its first stocks.
     initial = {
         k: {name: float(generator.choice(pair)) for name, pair in INITIAL_LIMITS.items()} for k in range(0, number, 3)
@@ -174,6 +177,7 @@ def test_carbon_of_each_stock(run):
 def test_some_stands_burn_and_some_are_cut(run):
     """Otherwise the budgets above would not have been put to the test."""
     records = pd.concat([year.record for year in run])
+    assert (records.fire_mortality > 0.0).any()
     assert (records.thinned_stems_ha > 0.0).any() and (records.planted_stems_ha > 0.0).any()
     assert (records.runoff_mm > 0.0).any() and (records.sublimation_mm > 0.0).any()
 

@@ -46,12 +46,16 @@ def test_every_column_of_both_tables_is_there(dataset):
 
 
 def test_numbers_are_the_tables_in_units_of_alma(dataset, daily):
-    seconds = 86400.0
-    np.testing.assert_allclose(dataset.NEE * seconds, daily.nee_kgc_m2, rtol=1e-12, atol=1e-18)
-    np.testing.assert_allclose(dataset.Qle * seconds / 1e6, daily.latent_heat_mj_m2, rtol=1e-12)
-    np.testing.assert_allclose(dataset.Precip * seconds, daily.precipitation_mm, rtol=1e-12)
-    np.testing.assert_allclose(dataset.Tair - 273.15, daily.air_temperature_c, rtol=1e-12, atol=1e-10)
-    np.testing.assert_array_equal(dataset.SnowDepth, daily.snow_depth_m)
+    seconds, flows = 86400.0, ("precipitation_mm", "evapotranspiration_mm", "runoff_mm")
+    for column, (name, *_) in VARIABLES.items():
+        values = dataset[name]
+        if column in flows or column.endswith("_kgc_m2"):
+            values = values * seconds
+        elif column.endswith("_mj_m2"):
+            values = values * seconds / 1e6
+        elif column.endswith("_c"):
+            values = values - 273.15
+        np.testing.assert_allclose(values, daily[column], rtol=1e-12, atol=1e-10, err_msg=column)
     np.testing.assert_array_equal(dataset.time, daily.index)
     annual = sim.simulate(**RUN)
     np.testing.assert_array_equal(dataset.annual_active_layer_depth_m, annual.active_layer_depth_m)

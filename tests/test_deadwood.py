@@ -92,7 +92,7 @@ def test_the_first_dead_wood_is_what_the_stand_keeps_up():
     )
     first = stands.stocks(np.arange(number))["deadwood_kgc_m2"]
     table = pd.DataFrame(stands.step(np.full(number, 12)), columns=sim.RECORD_NAMES)
-    np.testing.assert_allclose(columns(table, "input"), columns(table, "decay"), rtol=0.25)
+    np.testing.assert_allclose(columns(table, "input"), columns(table, "decay"), rtol=0.05)
     assert ((0.2 < first) & (first < 6.0)).all()  # kgC m-2: 10 to 300 m3/ha, as in boreal forests left alone
 
 

@@ -147,7 +147,8 @@ def test_site_specific_mode_is_one_world_whatever_the_seed():
 
 
 def test_site_specific_mode_is_the_middle_of_every_range_without_noise():
-    observation, _ = quick(mode="site-specific").reset(seed=1)
+    env = quick(mode="site-specific")
+    observation, _ = env.reset(seed=1)
     middle = {
         "density": 300.0 / 1500.0,
         "conifer_fraction": 0.5,
@@ -158,9 +159,8 @@ def test_site_specific_mode_is_the_middle_of_every_range_without_noise():
     }
     for name, value in middle.items():
         assert observation[INDEX[name]] == pytest.approx(value, rel=1e-5), name
-    daily = sim.simulate({"daily_noise_std_c": 0.0}, 12, seed=0, years=1, time_step_minutes=240, output="daily")
-    smooth = np.abs(np.diff(daily.air_temperature_c)).max()
-    assert smooth < 1.0
+    noise = sim.state.PARAMETER_NAMES.index("daily_noise_std_c")
+    assert env._episodes.stands.parameters[0, noise] == 0.0
 
 
 def test_site_specific_mode_with_another_site():
@@ -185,6 +185,7 @@ def test_final_totals_are_those_of_the_record():
     assert info["final_density"] == y["density_stems_ha"][-1]
     assert info["mean_density"] == pytest.approx(y["density_stems_ha"].mean())
     assert info["final_conifer_fraction"] == y["conifer_fraction"][-1]
+    assert info["mean_conifer_fraction"] == pytest.approx(y["conifer_fraction"].mean())
     for name in ("growing_season_days", "latent_heat_mj_m2", "ground_shortwave_mj_m2"):
         assert info[name] == pytest.approx(y[name].mean())
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import torch
 from scripts import ROOT, run_script
-from toy_env import optimal_return
+from toy_env import ToyVectorEnv, optimal_return
 
 from cleanrl_style import eupg_fixed_lambda, eupg_var_lambda, protocol
 from cleanrl_style.eupg_var_lambda import Agent, compute_utilities, eupg_loss, policy_input
@@ -96,8 +96,8 @@ def test_masked_actions_have_no_probability_and_the_others_all_of_it(episode):
     np.testing.assert_allclose(probabilities.sum(axis=1), 1)
 
 
-def test_evaluation_gives_the_policy_what_training_gives_it():
-    """One episode under the protocol and by the lines of the training loop: the same x at every step."""
+def test_evaluation_gives_the_policy_the_returns_so_far():
+    """Played again by hand: the same x at every step."""
     evaluated = []
     task = protocol.Task.of("toy_env:toy-v0")
     actions = np.random.default_rng(0).integers(25, size=10)
@@ -107,7 +107,6 @@ def test_evaluation_gives_the_policy_what_training_gives_it():
         return np.eye(25)[[actions[len(evaluated) - 1]]]
 
     protocol.evaluate(task, policy, [0.25], 1, policies=("greedy",))
-    # the training loop's own lines, on the same episode
     env = gym.make("toy_env:toy-v0", disable_env_checker=True)
     next_obs, _ = env.reset(seed=protocol.FIRST_EVALUATION_SEED, options={"preference": 0.25})
     episode_returns = np.zeros((1, 2))
@@ -116,6 +115,45 @@ def test_evaluation_gives_the_policy_what_training_gives_it():
         next_obs, reward, *_ = env.step(action)
         episode_returns += reward
     assert evaluated[-1][0, -2:].abs().sum() > 0.1
+
+
+class RecordedToy(ToyVectorEnv):
+    """Keeps what it gave and was given."""
+
+    seen, done, paid = [], [], []
+
+    def _observe(self):
+        self.seen.append(super()._observe())
+        return self.seen[-1]
+
+    def step(self, actions):
+        observations, rewards, *rest = super().step(actions)
+        self.done.append(actions)
+        self.paid.append(rewards)
+        return observations, rewards, *rest
+
+
+def test_the_first_update_is_that_of_its_first_episodes(tmp_path):
+    """From what the environment gave in the script's training, by the functions that are tested above."""
+    gym.register("recorded-toy-v0", "toy_env:ToyEnv", vector_entry_point=lambda num_envs: RecordedToy(num_envs))
+    given = ("--env-id", "recorded-toy-v0", "--vectorization", "lockstep", "--num-envs", 3, "--total-timesteps", 30)
+    run_script("cleanrl_style/eupg_var_lambda.py", *given, "--eval-episodes", 1, "--run-dir", tmp_path)
+    seen, actions, rewards = (
+        np.stack([of_all for of_all in kept if len(of_all) == 3][:10])  # not of the one that is tried before
+        for kept in (RecordedToy.seen, RecordedToy.done, RecordedToy.paid)
+    )
+    accrued = np.cumsum(rewards, axis=0) - rewards
+    x = torch.cat([policy_input(*one) for one in zip(seen, accrued, strict=True)])
+    masks = torch.from_numpy(np.where(np.arange(25) < 15, True, seen[:, :, [2]] == 0).reshape(-1, 25))
+    weights = np.stack([seen[0, :, 0], 1 - seen[0, :, 0]], axis=1).astype(float)
+    utilities = compute_utilities(rewards, weights, 1.0, "future")
+    torch.manual_seed(1)
+    agent = Agent(SimpleNamespace(single_observation_space=gym.spaces.Box(0, 1, (3,))))
+    loss, _ = eupg_loss(agent, x, masks, torch.from_numpy(actions.ravel()), torch.from_numpy(utilities.ravel()).float())
+    loss.backward()
+    norm = torch.stack([p.grad.norm() for p in agent.parameters()]).norm().item()
+    first = pd.read_csv(tmp_path / "updates.csv").iloc[0]
+    np.testing.assert_allclose((first.policy_loss, first.gradient_norm), (loss.item(), norm), rtol=1e-4)
 
 
 def learn(script, folder, *arguments):

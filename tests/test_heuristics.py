@@ -1,4 +1,6 @@
 import importlib.util
+import os
+import subprocess
 import sys
 
 import gymnasium as gym
@@ -72,7 +74,13 @@ def test_run_folder(script, tmp_path):
     assert years.groupby(["policy", "preference", "year", "variable"]).size().eq(1).all()
 
 
-def test_no_torch_is_needed(monkeypatch):
+def test_no_torch_is_needed(monkeypatch, tmp_path):
+    (tmp_path / "torch.py").write_text("raise ModuleNotFoundError('torch is not there', name='torch')")
+    script = ROOT / "baselines_heuristic" / "zero_change.py"
+    given = ("--eval-episodes", "1", "--eval-weights", "1", "--run-dir", tmp_path / "run")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    subprocess.run([sys.executable, script, *given], check=True, capture_output=True, cwd=ROOT, env=environment)
+    assert (tmp_path / "run" / "evaluation.csv").exists()
     there = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else there(name))
     packages = {"numpy", "numba", "gymnasium", "pandas", "matplotlib", "moocore"}

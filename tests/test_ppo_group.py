@@ -169,6 +169,18 @@ def test_groups_share_site_start_and_weather_async_as_in_lockstep(tmp_path):
     assert_same_bytes(tmp_path / "async", tmp_path / "lockstep", same)
 
 
+def test_what_all_of_a_group_lose_teaches_nothing(tmp_path):
+    """In a group of two what both lose is gone to the bit; without groups it is not."""
+    for size in (2, 1):
+        for toy in ("resumable-toy-v0", "shifted-toy-v0"):
+            train(tmp_path / f"{toy}-{size}", "--group-size", size, env_id=f"resumable_toy:{toy}")
+        one, other = (
+            torch.load(tmp_path / f"{toy}-{size}" / "policy.pt", weights_only=True)["agent"]["actor.0.weight"]
+            for toy in ("resumable-toy-v0", "shifted-toy-v0")
+        )
+        assert torch.equal(one, other) == (size == 2)
+
+
 @pytest.mark.parametrize("arguments", [(), ("--group-size", 1, "--rollout-steps", 48)])
 def test_killed_and_resumed_is_as_never_killed(arguments, tmp_path, monkeypatch):
     """Also without groups where rollouts cut episodes."""

@@ -92,6 +92,8 @@ def test_era5_land_by_the_hour(weather, since_midnight):
     assert corr > 0.95
     humidity = forcing.relative_humidity.resample("D").mean() - weather.relative_humidity.resample("D").mean()
     assert humidity.abs().max() < 0.05
+    for name, error in (("air_temperature_c", 0.1), ("relative_humidity", 0.01)):  # an hour off is several times that
+        assert (forcing[name] - weather[name].resample("h").mean()).abs().mean() < error, name
 
 
 def test_days_are_those_of_the_disaggregator():

@@ -121,10 +121,8 @@ def test_a_path_that_changes_nothing_gives_the_same_bytes(unchanged):
     pd.testing.assert_frame_equal(simulate(path()), unchanged, check_exact=True)
 
 
-def test_the_first_year_is_warmer_and_wetter_by_what_the_path_says(unchanged):
+def test_the_first_years_are_warmer_and_wetter_by_what_the_path_says(unchanged):
     changed = simulate("ssp245")
-    for name in ("air_temperature_c", "precipitation_mm"):
-        assert changed[name].shape == unchanged[name].shape
     expected = PATHS["ssp245"].query("year >= @FIRST_YEAR").iloc[:3].reset_index(drop=True)
     difference = changed.air_temperature_c - unchanged.air_temperature_c
     np.testing.assert_allclose(difference, expected.warming_k, atol=1e-9)

@@ -213,10 +213,10 @@ def test_seedlings_on_empty_ground_are_of_both_species():
     assert table.conifer_fraction[0] == 0.5
 
 
-@pytest.mark.parametrize("minutes", [10, 15, 30, 60, 120])
+@pytest.mark.parametrize("minutes", [10, 15, 60, 120])
 def test_any_divisor_of_a_day_is_a_time_step(minutes):
     table = simulate(time_step_minutes=minutes)
-    assert table.gpp_kgc_m2[0] == pytest.approx(simulate(time_step_minutes=30).gpp_kgc_m2[0], rel=0.1)
+    assert table.gpp_kgc_m2[0] == pytest.approx(simulate(time_step_minutes=30).gpp_kgc_m2[0], rel=0.02)
 
 
 @pytest.mark.parametrize("mechanism", sim.MECHANISMS)
@@ -243,13 +243,13 @@ def test_no_heat_flows_through_a_boundary_in_balance():
     for boundary in ("sampled", "balanced"):
         table = simulate(site, boundary=boundary, years=10, mechanisms={"fire": False})
         heat[boundary] = (table.boundary_warming_mj_m2 - table.boundary_cooling_mj_m2).mean()
-    assert abs(heat["balanced"]) < 5.0 < abs(heat["sampled"])
+    assert abs(heat["balanced"]) < 1.5 and abs(heat["sampled"]) > 5.0
 
 
 def test_the_boundary_in_balance_does_not_hang_on_the_sites_own():
     tables = [simulate({"deep_boundary_temperature_k": k}, boundary="balanced") for k in (262.0, 278.0)]
     difference = (tables[0] - tables[1]).deep_soil_temperature_c[0]
-    assert abs(difference) < 0.2
+    assert abs(difference) < 0.05
 
 
 def test_a_boundary_that_cannot_be_in_balance_is_told():
@@ -264,7 +264,8 @@ def test_balanced_soil_carbon_keeps_what_it_gets():
         simulate(initial=initial, soil_carbon=how, mechanisms=quiet, time_step_minutes=120, years=5).mean()
         for how in ("drawn", "balanced")
     )
-    assert abs(balanced.soil_change_kgc_m2) < 0.2 * balanced.litterfall_kgc_m2 < drawn.soil_change_kgc_m2
+    assert abs(balanced.soil_change_kgc_m2) < 0.07 * balanced.litterfall_kgc_m2
+    assert drawn.soil_change_kgc_m2 > 0.2 * drawn.litterfall_kgc_m2
     given = simulate(initial={**initial, "soil_kgc_m2": 3.0}, soil_carbon="balanced")
     assert given.soil_kgc_m2[0] - given.soil_change_kgc_m2[0] == pytest.approx(3.0)
     treeless = {"density_stems_ha": 0.0}
@@ -984,10 +985,9 @@ def mature_stands():
 
 
 @pytest.mark.parametrize(("name", "band"), BANDS.items(), ids=BANDS)
-def test_mature_stands_are_boreal_within_a_factor_of_three(mature_stands, name, band):
+def test_the_median_of_mature_stands_is_boreal(mature_stands, name, band):
     low, high = band
-    middle = 0.5 * (low + high)
-    assert middle / 3.0 <= mature_stands[name].median() <= 3.0 * middle
+    assert low <= mature_stands[name].median() <= high
 
 
 def test_mature_stands_are_ordered_as_in_nature(mature_stands):

@@ -213,11 +213,12 @@ def test_quick_run_writes_the_same_bytes_twice(tmp_path, capsys):
 
 
 def test_refusals_are_one_line(tmp_path):
-    with pytest.raises(SystemExit, match="--free-sites of at least 1 is allowed, not 0"):
+    with pytest.raises(SystemExit, match="--free-sites of at least 1 is allowed, not 0") as few:
         run_script("analysis/validate.py", "--free-sites", "0")
     (tmp_path / "file").write_text("")
-    with pytest.raises(SystemExit, match="--output-dir .*: cannot write there"):
+    with pytest.raises(SystemExit, match="--output-dir .*: cannot write there") as unwritable:
         run_script("analysis/validate.py", "--quick", "--parts", "towers", "--output-dir", tmp_path / "file")
+    assert "\n" not in str(few.value) + str(unwritable.value)
 
 
 def test_every_miss_is_listed_and_parts_keep_their_order():
