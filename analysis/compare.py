@@ -37,17 +37,39 @@ class Args:
 
 def row_of(folder: Path) -> tuple[tuple, list[Replicate]]:
     """Script, environment and setting of the runs below a folder, and its replicates; ends the command if not one."""
+    if not folder.is_dir():
+        fail(f"{folder}: no such folder; one with runs is allowed, such as runs/<script>/<setting>")
     results = Results.load(False, (folder,))
     rows = {key: replicates for key, replicates in results.rows.items() if replicates}
     for problem in results.left_out:
         print(f"left out: {problem}", file=sys.stderr)
     if len(rows) != 1:
-        found = "; ".join(", ".join(filter(None, key)) for key in rows) or "none"
-        fail(f"{folder}: the finished runs of one method and setting are allowed, not of: {found}")
+        found = ", ".join(sorted({str(run.folder.parent) for run in results.runs}))
+        fail(
+            fail(
+                f"{folder} holds "
+                + (f"runs of {len(rows)} settings; give one of {found}" if rows else "no finished run")
+            )
+        )
     [(key, replicates)] = rows.items()
     if any(one.plans is None for one in replicates):
-        fail(f"{folder}: no constant plans are known on the episodes of {key[1]}, which gains are in percent of")
+        fail(
+            f"{folder}: no constant plans are known on its episodes, in percent of whose gains the difference is; they "
+            "are of the project's environments without --site-seed and --thaw-formulation. The score at the run's end, "
+            "and evaluation.csv, are what there is of others"
+        )
+    for line in results.of_several_sources():
+        print(f"warning: {line}", file=sys.stderr)
+    if "scalarization" in key[2]:
+        print(f"{folder}: scores here are of the weighted sum; that of its own utility is at the run's end")
     return key, replicates
+
+
+def evaluated(key: tuple, row: list[Replicate]) -> str:
+    """How a row was evaluated, by its flags."""
+    arguments = row[0].runs[0].arguments
+    weights = " ".join(" ".join(f"{w:g}" for w in np.ravel(weight)) for weight in arguments["eval_weights"])
+    return f"--env-id {key[1]} --eval-weights {weights} --eval-episodes {arguments['eval_episodes']}"
 
 
 def gains_on_sites(replicates: list[Replicate], policy: str) -> tuple[np.ndarray, np.ndarray]:
@@ -67,10 +89,14 @@ def told_from(values: np.ndarray, seeds: int) -> float:
 def main(args: Args) -> None:
     """Print both scores and their difference, greedy and sampled."""
     (key, first), (other, second) = row_of(args.first), row_of(args.second)
-    weights = [np.unique(metrics.weights_of(row[0].evaluation), axis=0).tolist() for row in (first, second)]
-    if key[1] != other[1] or weights[0] != weights[1]:
-        fail(f"the same environment and weights are allowed, not {key[1]} {weights[0]} and {other[1]} {weights[1]}")
-    best = metrics.best_constant_plans(first[0].plans, np.array(weights[0])).scalarized_return.mean()
+    weights = [np.unique(metrics.weights_of(row[0].evaluation), axis=0) for row in (first, second)]
+    how = f"{evaluated(key, first)}, and {evaluated(other, second)}"
+    if key[1] != other[1] or not np.array_equal(*weights):
+        fail(f"the two were evaluated differently: {how}")
+    gains = {policy: [gains_on_sites(row, policy) for row in (first, second)] for policy in protocol.POLICIES}
+    if any(not np.array_equal(ours[1], theirs[1]) for ours, theirs in gains.values()):
+        fail(f"the two were evaluated on different sites: {how}")
+    best = metrics.best_constant_plans(first[0].plans, weights[0]).scalarized_return.mean()
     for name, (script, env_id, setting), row in (("first", key, first), ("second", other, second)):
         title = ", ".join(filter(None, (methods.title(script), methods.flags(setting))))
         scores = main_results.scores(row)
@@ -80,9 +106,7 @@ def main(args: Args) -> None:
         )
         print(f"{name}: {title} on {env_id}, training seeds: {len(row)}, score {', '.join(both)}")
     for policy in protocol.POLICIES:
-        (ours, sites), (theirs, its_sites) = (gains_on_sites(row, policy) for row in (first, second))
-        if not np.array_equal(sites, its_sites):
-            fail(f"the same sites are allowed: --eval-episodes {len(sites)} and {len(its_sites)}")
+        (ours, sites), (theirs, _) = gains[policy]
         value, low, high = 100 * np.array(metrics.difference_interval(ours, theirs)) / best
         text = f"{policy}: first less second {value:+.1f} points"
         if min(len(first), len(second)) > 1:
@@ -92,7 +116,7 @@ def main(args: Args) -> None:
             text += f"over seeds alone: {told}"
             seeds = min(len(ours), len(theirs))
             least = max(told_from(100 * gained.mean(axis=1) / best, seeds) for gained in (ours, theirs))
-            text += f" ({seeds} seeds each tell {least:.1f} points, four times of five)"
+            text += f" (with {seeds} seeds each a t test finds {least:.1f} points with a power of 80 %)"
         else:
             text += ", and no interval of a single training seed"
         print(text)

@@ -103,7 +103,8 @@ def main(args: Args) -> None:
             figure.supxlabel(textwrap.fill(f"{world}. {many_objectives.CAPTION}", int(18 * size[0])), fontsize=6)
             save(figure, folder / name)
     say_what_was_not_run("figures", not_run)
-    print(f"{len(FIGURES) - len(not_run) + len(others)} figures: {folder}/*.png, *.pdf")
+    number = len(FIGURES) - len(not_run) + len(others)
+    print(f"{number} figure{'s'[: number != 1]}: {folder}/*.png, *.pdf")
 
 
 if __name__ == "__main__":

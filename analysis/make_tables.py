@@ -58,8 +58,9 @@ TABLES = (
 
 SHOWN = 3  # commands of what is not there
 EXPLANATION = """Score: 0 is to do nothing, 100 the best constant plan of each weight. Interquartile mean over training
-seeds [95 % bootstrap interval, of score and gain over seeds and sites]. Seeds to tell 0.1: how many training seeds
-each of two methods needs for four tests of five (t, 5 %) to tell gains apart that differ by 0.1."""
+seeds [95 % bootstrap interval, of score and gain over seeds and sites]; of the weighted sum, whatever the utility of a
+training. Seeds to tell 0.1: how many training seeds each of two methods needs for a t test (5 %) to find a difference
+of 0.1 in gain with a power of 80 %."""
 
 
 @dataclass
@@ -108,8 +109,15 @@ def main(args: Args) -> None:
         print(f"left out: {line}", file=sys.stderr)
     others = finished.of_another_physics(results.runs)
     if others:
-        of = f"{len(others)} of {len(results.runs)} runs were made with another source of the simulator, or do not say"
-        print(f"{of} with which, such as {others[0].folder}; --overwrite makes a run anew", file=sys.stderr)
+        of = (
+            f"{len(others)} of {len(results.runs)} runs are of another version of the simulator, or do not say of which"
+        )
+        print(
+            f"{of}: {others[0].folder}{', ..' * (len(others) > 1)}; the script's --overwrite trains one anew",
+            file=sys.stderr,
+        )
+    for line in results.of_several_sources():
+        print(f"warning: {line}", file=sys.stderr)
     mixed = [run for run in results.runs if "begun_with" in run.config]
     if mixed:
         of = f"{len(mixed)} of {len(results.runs)} runs were begun with one code and went on with another"

@@ -214,6 +214,22 @@ class Results:
         table = of_environment(self.constant_plans, env_id)
         return table if len(table) else None
 
+    def of_several_sources(self) -> list[str]:
+        """A line for each row, of runs that are not the archive's, whose seeds several versions of a script trained."""
+        archive, lines = paths.archive().absolute(), []
+        for (script, *_), replicates in self.rows.items():
+            runs_of = [run for one in replicates for run in one.runs if archive not in run.folder.absolute().parents]
+            seeds: dict[str | None, list[str]] = {}
+            for run in runs_of:
+                seeds.setdefault(run.config.get("source"), []).append(str(run.arguments["seed"]))
+            if len(seeds) > 1:
+                by = ", and ".join(" ".join(group) for group in seeds.values())
+                lines.append(
+                    f"{runs_of[0].folder.parent}: its seeds were trained by {len(seeds)} versions of {script}.py: "
+                    f"{by}; --overwrite trains a run anew"
+                )
+        return lines
+
     @cached_property
     def constant_plans(self) -> pd.DataFrame | None:
         """The study of that name."""

@@ -32,6 +32,8 @@ PARSING = re.compile(
 )
 #: What it says of them where there may be any number.
 SEVERAL = re.compile(r"Error parsing (--\S+): Could not find valid parse for arguments: \[(.*)\]\.?")
+#: What it says of words that are no flags.
+UNKNOWN = re.compile(r"Unrecognized options: (.*)")
 #: What it says of a value that is none of a few, in an order of its own where None is one of them.
 CHOICE = re.compile(r"invalid choice '(.*)' for argument '(--\S+)'\. Expected one of \((.*)\)\.")
 #: Closed interval of each argument that has one; an algorithm's own are the `limits` of its arguments.
@@ -103,6 +105,8 @@ def policy_file(run_or_name) -> Path:
     if not os.path.exists(path):
         path = ships.get(str(run_or_name), path)
     if not os.path.isfile(path):
+        if runs := sorted(path.parent.glob(f"seed*/{POLICY}")):
+            raise FileNotFoundError(f"{path.parent} holds several runs: give one of them, such as {runs[0].parent}")
         raise FileNotFoundError(
             f"{run_or_name or repr('')}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a "
             f"policy that ships ({', '.join(ships) or 'none does yet'})"
@@ -168,7 +172,17 @@ def message_of(box: str) -> str:
     meant = [after.split()[0] for line, after in itertools.pairwise(lines) if line.startswith(headings)]
     if meant:
         return f"{message}; did you mean {', '.join(sorted({*meant}))}?"
+    if unknown := UNKNOWN.fullmatch(message):
+        return f"{message}; {way_on(unknown[1].split(', ')[0])}"
     return in_plain_words(message.partition(" Got errors:")[0])  # of each type that the flag may have
+
+
+def way_on(word: str) -> str:
+    """What to do about a word of the command line that is no flag."""
+    before = sys.argv[sys.argv.index(word) - 1] if word in sys.argv[2:] else ""
+    if word.startswith("-") or not before.startswith("--"):
+        return "--help lists all"
+    return f"{before} takes no value, {before.replace('--', '--no-', 1)} is its opposite"
 
 
 def in_plain_words(message: str) -> str:
@@ -178,7 +192,7 @@ def in_plain_words(message: str) -> str:
     if choice := CHOICE.fullmatch(message):
         allowed = {*words_of(choice[3]).split()} - {"None"}
         allowed = sorted(allowed, key=lambda word: (word.isdigit() and int(word), word))
-        return f"{choice[2]} {choice[1]}: {', '.join(allowed)} are allowed"
+        return f"{choice[2]} {choice[1]}: {', '.join(allowed)} {'is' if len(allowed) == 1 else 'are'} allowed"
     found = PARSING.fullmatch(message)
     if not found:
         return message

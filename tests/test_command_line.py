@@ -159,6 +159,10 @@ def test_an_environment_that_draws_nothing_cannot_be_watched(run, monkeypatch):
         (["watch", "nobody"], "nobody: neither the folder of a finished run"),
         (["watch", "{run}", "--preference", "2"], r"--preference: a number in \[0, 1\] is allowed, got 2.0"),
         (["watch", "{run}", "--env-id", "boreal-balanced-v0"], "observes 43 entries, boreal-balanced-v0 has 105"),
+        (
+            ["watch", "{run}", "--env-id", "boreal-timber-v0", "--preference", "0.3"],
+            "observes 43 entries, boreal-timber-v0",
+        ),
         (["watch", "{run}", "--env-id", "boral-v0"], "boral"),
         (["watch", "{run}", "--env-id", "./pond.py:pond-v0"], "a module is allowed, such as pond:pond-v0, with PYTHON"),
         (["watch", "{run}", "--env-id", "pond.py:pond-v0"], "a module is allowed, such as pond:pond-v0, with PYTHON"),

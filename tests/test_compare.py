@@ -1,13 +1,16 @@
 """Two methods are compared by their difference on the same sites."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 from scripts import ROOT
+from tiny_runs import write_run
 
 from analysis import compare
+from analysis.results import Results
 
 RUNS, BALANCED = ROOT / "results" / "runs", "boreal-balanced-v0-vectorization=lockstep"
 
@@ -38,14 +41,22 @@ def test_a_single_training_has_no_interval(capsys):
 @pytest.mark.parametrize(
     "first, second, wrong",
     [
-        ("plan_regression", "plan_regression", "one method and setting are allowed, not of: plan_regression, boreal-"),
+        (
+            "plan_regression",
+            "plan_regression",
+            "plan_regression holds runs of 2 settings; give one of .*/boreal-balanced-v0",
+        ),
         (f"plan_regression/{BALANCED}", "nothing", "nothing: no such folder"),
         (
             f"plan_regression/{BALANCED}",
             "plan_regression/boreal-generalist-v0-vectorization=lockstep",
-            "the same environment and weights are allowed",
+            "evaluated differently: --env-id boreal-balanced-v0 .*, and --env-id boreal-generalist-v0 ",
         ),
-        (f"ppo_group/{BALANCED}", "ppo_group/boreal-warming-v0-vectorization=lockstep", "same environment|no constant"),
+        (
+            f"ppo_group/{BALANCED}",
+            "ppo_group/boreal-warming-v0-vectorization=lockstep",
+            "evaluated differently|no constant",
+        ),
     ],
 )
 def test_what_cannot_be_compared_is_named(first, second, wrong):
@@ -66,9 +77,22 @@ def test_what_so_many_seeds_tell():
 def test_other_weights_are_refused(monkeypatch):
     def row(*weights):
         evaluation = pd.DataFrame({"preference": weights, "carbon_return": 0.0, "thaw_return": 0.0})
-        return ("script", "env", "default"), [SimpleNamespace(evaluation=evaluation, plans=None)]
+        runs = [SimpleNamespace(arguments={"eval_weights": weights, "eval_episodes": 1})]
+        return ("script", "env", "default"), [SimpleNamespace(evaluation=evaluation, plans=None, runs=runs)]
 
     rows = iter([row(0.0, 1.0), row(0.0, 0.5)])
     monkeypatch.setattr(compare, "row_of", lambda folder: next(rows))
-    with pytest.raises(SystemExit, match="same environment and weights"):
+    with pytest.raises(
+        SystemExit, match="--eval-weights 0 1 --eval-episodes 1, and --env-id env --eval-weights 0 0.5 "
+    ):
         compare.main(compare.Args(RUNS, RUNS))
+
+
+def test_seeds_of_two_versions_of_a_script_are_named(tmp_path):
+    for seed, source in ((1, "a"), (2, "b"), (3, "a")):
+        folder = tmp_path / "ppo_group" / "boreal-generalist-v0" / f"seed{seed}"
+        write_run(folder, "ppo_group", seed=seed)
+        config = json.loads((folder / "config.json").read_text())
+        (folder / "config.json").write_text(json.dumps({**config, "source": source}))
+    (line,) = Results.load(False, (tmp_path,)).of_several_sources()
+    assert "its seeds were trained by 2 versions of ppo_group.py: 1 3, and 2; --overwrite" in line

@@ -3,6 +3,7 @@
 import importlib
 import json
 import re
+import shutil
 
 import pandas as pd
 import pytest
@@ -13,9 +14,9 @@ from cleanrl_style.protocol.run_folder import folder_name
 PAGE = (ROOT / "docs" / "new_method.md").read_text(encoding="utf-8")
 
 
-def block(language):
-    """The page's one block of code in a language."""
-    (text,) = re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+def block(language, start=""):
+    """The page's one block of code in a language that begins so."""
+    (text,) = re.findall(rf"```{language}\n({start}.*?)```", PAGE, re.DOTALL)
     return text
 
 
@@ -53,8 +54,16 @@ def test_the_followed_example(tmp_path):
     assert config["training_environment"] == {"group_size": 4}
 
 
+def test_the_figure_is_drawn_from_the_tables(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs" / "tables").mkdir(parents=True)
+    shutil.copy(ROOT / "results" / "tables" / "detailed_objectives.csv", tmp_path / "runs" / "tables")
+    exec(block("python", "import matplotlib"), {})
+    assert (tmp_path / "gains.png").stat().st_size > 10_000
+
+
 def test_the_environment_of_ones_own(tmp_path, monkeypatch):
-    (tmp_path / "pond.py").write_text(block("python").replace("# pond.py\n", ""), encoding="utf-8")
+    (tmp_path / "pond.py").write_text(block("python", "# pond.py\n").replace("# pond.py\n", ""), encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
     run_script(

@@ -115,6 +115,8 @@ def test_that_nothing_was_learnt_is_said_of_returns_as_they_ship(capsys, monkeyp
     for gain, said in ((0.0, 1), (0.01, 0)):
         summary.print_score(PAIR, compare(greedy=((gain,) * 3, (gain,) * 3)))
         assert capsys.readouterr().out.count("it has learnt nothing yet") == said
+    summary.print_score(PAIR, compare(greedy=((0.0,) * 3, (0.0,) * 3)), trained=False)
+    assert "it has learnt nothing yet" not in capsys.readouterr().out
 
 
 def test_a_run_that_starts_over_is_another_of_weights_and_biases(tmp_path, monkeypatch):

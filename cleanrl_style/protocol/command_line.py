@@ -89,8 +89,8 @@ def check(args: argparse.Namespace) -> None:
     if args.site_seed is not None:
         check_seed("--site-seed", args.site_seed)
     if args.env_id is not None:
-        check_preference(args.preference, len(ask(args.env_id).objectives))
-    elif args.preference:
+        ask(args.env_id)
+    if args.preference:  # whether it has a weight for each objective shows when policy and environment are known to fit
         check_preference(args.preference, max(2, len(args.preference)))
     if args.out is not None and not args.out.absolute().parent.is_dir():
         raise ValueError(f"--out {args.out}: there is no folder {args.out.parent}")

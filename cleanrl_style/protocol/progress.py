@@ -47,7 +47,7 @@ class Progress:
         elif self.returns:
             means = zip(self.objectives, np.mean(self.returns, axis=0), strict=True)
             text = ", ".join(f"{name} {mean:+.2f}" for name, mean in means)
-            line += f", mean returns of the last {len(self.returns)} episodes: {text}"
+            line += f", {text} (mean of {len(self.returns)} episodes)"
         if self.terminal:
             width = shutil.get_terminal_size().columns - 1
             print("\r" + line[:width].ljust(width), end="\n" if last else "", flush=True)

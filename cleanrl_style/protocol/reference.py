@@ -127,7 +127,7 @@ def known_or_measured(task: Task, seeds: list[int]) -> pd.DataFrame:
     path = cache_folder().parent / FOLDER / f"{task.env_id}-{name}.csv.gz"
     with contextlib.suppress(OSError, EOFError, ValueError, zlib.error):  # not there, or damaged
         return read(path)[0]
-    print("constant plans on these episodes, for the score: played once, then kept")
+    print(f"constant plans on these {len(seeds)} episodes, which gains are set beside: played once, then kept")
     table = measure(task, seeds)
     try:
         # another process may measure the same meanwhile

@@ -217,7 +217,9 @@ class Run:
             if damaged:
                 what = "damaged" if (self.folder / damaged).exists() else "missing"
                 fail(f"{self.folder / damaged} is {what}; --overwrite starts over")
-            print(f"{self.folder}: this run is finished (--overwrite starts over)")
+            changed = config.get("source") not in (None, self.config["source"])
+            now = f"finished, but {self.script}.py has changed since (--overwrite trains it anew)"
+            print(f"{self.folder}: this run is {now if changed else 'finished (--overwrite starts over)'}")
             sys.exit(0)
         code_here = {**self.config["versions"], **{name: self.config[name] for name in CODE}}
         if "begun_with" in config:
@@ -461,7 +463,7 @@ class Run:
         if comparison is None:
             print_table(objectives, evaluation)
         else:
-            print_score(objectives, comparison)
+            print_score(objectives, comparison, trained=hasattr(self.args, "total_timesteps"))
         if self.course is not None:
             print_course(self.course, pd.read_csv(self.folder / "validation.csv"))
         print(f"{self.folder}: finished in {time.perf_counter() - self.start:.0f} s")

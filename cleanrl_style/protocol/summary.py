@@ -45,8 +45,11 @@ def print_table(objectives, evaluation: pd.DataFrame) -> None:
     print(row(f"{'mean':>{label}}", first.mean(), second.mean()) + "\n")
 
 
-def print_score(objectives, comparison: Comparison) -> None:
-    """Gains per weight beside what one can do without looking, the score, and how far the preference is followed."""
+def print_score(objectives, comparison: Comparison, trained: bool = True) -> None:
+    """Gains per weight beside what one can do without looking, the score, and how far the preference is followed.
+
+    trained : whether something was to be learnt; of a fixed strategy it is not said that nothing was.
+    """
     table, label = comparison.by_weight, 6 * len(fronts.weight_columns(objectives))
     shown = [*POLICIES, "plus_100", "best"]
     if len(objectives) == 2 and any(weight in table.index for weight in SHOWN_WEIGHTS):
@@ -77,7 +80,7 @@ def print_score(objectives, comparison: Comparison) -> None:
     print(
         f"{'SCORE':>{label}}" + "".join(f"{value:>{WIDTH}}" for value in scores.values()) + "  % of the best constant"
     )
-    if np.allclose(table[PRIMARY], 0.0, atol=1e-4):  # doing nothing is stored in six digits
+    if trained and np.allclose(table[PRIMARY], 0.0, atol=1e-4):  # doing nothing is stored in six digits
         print(f"The {PRIMARY} policy gains what doing nothing does: it has learnt nothing yet")
     if len(table) > 1:
         print(followed(objectives, comparison))
@@ -170,7 +173,7 @@ def _draw_gains(figure, ax, objectives, comparison: Comparison) -> None:
     x = means.index if len(objectives) == 2 else np.arange(len(means))
     styles = {
         "best": ("k:", "best constant plan of each weight (100)"),
-        "plus_100": ("k--", "100 stems a year"),
+        "plus_100": ("k--", "+100 a year"),
         "greedy": ("o-", "greedy policy"),
         "sampled": ("^-", "sampled policy"),
     }
@@ -198,7 +201,7 @@ def _draw_course(axes, objectives, course: Course, table: pd.DataFrame) -> None:
     steps = table.global_step.unique()
     ax, *others = axes[: len(objectives) + 1]
     ax.plot(steps, table.groupby("global_step").scalarized_gain.mean(), "o-", markersize=5, label="greedy policy")
-    lines = (("best", ":", "best constant plan of each weight (100)"), ("plus_100", "--", "100 stems a year"))
+    lines = (("best", ":", "best constant plan of each weight (100)"), ("plus_100", "--", "+100 a year"))
     for name, style, label in lines:
         ax.axhline(marks[name].scalarized_gain.mean(), linestyle=style, color="black", label=label)
     ax.set(ylabel="scalarized gain", title=f"training, gain over doing nothing on {course.where}")
