@@ -88,6 +88,11 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
             ["--total-timestep", "5", "--lerning-rate", "1"],
             r"Unrecognized options: .*; did you mean --learning-rate, --total-timesteps\?",
         ),
+        (
+            ["--hide-site", "True"],
+            "Unrecognized options: True; --hide-site takes no value, --no-hide-site is its opposite",
+        ),
+        (["--lr", "0.1"], "Unrecognized options: --lr, 0.1; --help lists all"),
         (["--eval-episodes", "201"], "--eval-episodes 201: at most 200 are allowed, as many as there are test sites"),
         (
             ["--eval-episodes", "201", "--env-id", "boreal-balanced-v0"],

@@ -6,7 +6,6 @@ from scripts import run_script
 from analysis import stored
 from analysis.studies import constant_plans, mechanism_pairs, site_warming
 from cleanrl_style.protocol import reference
-from cleanrl_style.protocol.fronts import evaluation_weights
 
 
 def test_a_pair_differs_in_its_one_thing(monkeypatch):
@@ -27,25 +26,6 @@ def test_a_pair_differs_in_its_one_thing(monkeypatch):
     )
     bare = both[both.off == "interception"].set_index("pair").loc[chosen[0]]
     assert (bare.lower_peak_swe_mm > climate.lower_peak_swe_mm).all()  # no tree catches snow
-
-
-def test_constant_plans_as_an_evaluation():
-    plans = pd.DataFrame(
-        {
-            "action": [24, 24, 20, 20],
-            "seed": [0, 1, 0, 1],
-            "episode": [0, 1, 0, 1],
-            "carbon_return": [2.0, 4.0, 1.0, 1.0],
-            "thaw_return": [-3.0, -1.0, 0.0, 2.0],
-        }
-    )
-    best = constant_plans.as_evaluation(plans, evaluation_weights(2))
-    # conifers 3 w - 2 (1 - w), deciduous w + (1 - w): equal at w = 0.6
-    chosen = best.groupby("preference").action.first()
-    assert chosen.tolist() == [20, 20, 20, 24, 24]
-    assert best[best.preference == 1].scalarized_return.tolist() == [2, 4]
-    dense = constant_plans.as_evaluation(plans, evaluation_weights(2), constant_plans.CONIFERS)
-    assert (dense.action == 24).all() and len(dense) == 2 * len(evaluation_weights(2))
 
 
 def test_drawn_episodes_are_of_both_kinds():

@@ -1,17 +1,13 @@
 import itertools
-import json
 
 import gymnasium as gym
 import numpy as np
 import pytest
-import torch
 from gymnasium.wrappers import RenderCollection
 from PIL import Image
 
 import boreal_env
 from analysis import draw_readme
-from cleanrl_style import ppo_curriculum
-from cleanrl_style.protocol import load_policy
 from cleanrl_style.protocol.command_line import FRAME_SIZE, save_animation
 from sim.task.picture import HEIGHT, WIDTH, preference, return_charts, view_of
 
@@ -113,19 +109,6 @@ def test_an_animation_has_all_frames_and_colours(tmp_path):
         for k, primary in enumerate((0, 2, 0, 2)):
             animation.seek(k)
             assert animation.convert("RGB").getpixel((0, 0))[primary] > 200
-
-
-def test_the_policy_of_a_run_is_played(tmp_path):
-    agent = ppo_curriculum.Agent(gym.make_vec("boreal-site-specific-v0", num_envs=1))
-    run = {"script": "ppo_curriculum", "arguments": {"env_id": "boreal-site-specific-v0"}}
-    saved = {"agent": agent.state_dict(), "arguments": {"num_values": 1}, "observation_shape": (43,), "run": run}
-    torch.save(saved, tmp_path / "policy.pt")
-    (tmp_path / "config.json").write_text(json.dumps(run))
-    policy = load_policy(tmp_path)
-    assert policy.env_id == "boreal-site-specific-v0" and not policy.looks_back
-    masks = np.zeros((2, 25), bool)
-    masks[0, 3] = masks[1, 24] = True
-    assert policy.act(np.zeros((2, 43), np.float32), masks).tolist() == [3, 24]
 
 
 def test_a_folder_without_a_policy_is_refused(tmp_path):

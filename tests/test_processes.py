@@ -946,23 +946,6 @@ def test_hazards():
 
 
 @pytest.mark.parametrize(
-    ("change", "density", "harvestable", "made"),
-    [
-        (100.0, 500.0, 0.0, 100.0),
-        (100.0, 1950.0, 0.0, 50.0),  # planting reaches 2000
-        (100.0, 2500.0, 0.0, 0.0),
-        (-100.0, 500.0, 400.0, -100.0),
-        (-100.0, 500.0, 30.0, -30.0),  # no more than may be cut
-        (-100.0, 190.0, 190.0, -40.0),  # never below 150
-        (-100.0, 120.0, 120.0, 0.0),
-        (0.0, 500.0, 400.0, 0.0),
-    ],
-)
-def test_what_can_be_made_of_a_density_change(change, density, harvestable, made):
-    assert management.feasible_change(change, density, harvestable) == made
-
-
-@pytest.mark.parametrize(
     ("cut", "mix", "conifers", "deciduous", "harvestable", "expected"),
     [
         (100.0, 0.5, 300.0, 300.0, (300.0, 300.0), 50.0),  # stays at one half: equal shares

@@ -95,8 +95,6 @@ def test_every_weight_has_the_same_episodes():
     table = sampled.pivot(index="seed", columns="preference", values="carbon_return")
     assert (table.nunique(axis=1) == 1).all() and table[0.0].nunique() == 3
     assert sampled.seed.min() >= protocol.FIRST_EVALUATION_SEED
-    highest_training_seed = (protocol.LIMITS["seed"][1] + 1) * protocol.MAX_ENVS - 1
-    assert highest_training_seed < protocol.FIRST_EVALUATION_SEED
 
 
 def test_the_policy_sees_the_accrued_returns():
@@ -409,21 +407,6 @@ def test_an_environment_without_a_valid_action_is_refused(tmp_path):
     with pytest.raises(SystemExit, match="hopeless-toy-v0: .* at least one of them true"):
         run_script("cleanrl_style/ppo_gated.py", "--env-id", "toy_env:hopeless-toy-v0", "--run-dir", tmp_path)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_budget_without_room_for_a_batch_is_refused(tmp_path):
-    with pytest.raises(SystemExit, match="--total-timesteps 8 has no room for a batch.*: 20 steps"):
-        run_script(
-            "cleanrl_style/eupg_var_lambda.py",
-            "--env-id",
-            "toy_env:toy-v0",
-            "--run-dir",
-            tmp_path,
-            "--num-envs",
-            2,
-            "--total-timesteps",
-            8,
-        )
 
 
 def test_an_interrupt_that_a_library_swallowed_comes_again():

@@ -72,6 +72,14 @@ class LooseToyEnv(ToyEnv):
         return super().action_masks().astype(np.int8)
 
 
+class ThawlessToyEnv(ToyEnv):
+    """Pays carbon alone."""
+
+    def step(self, action):
+        observation, reward, *rest = super().step(action)
+        return observation, reward * np.float32([1, 0]), *rest
+
+
 class HopelessToyEnv(ToyEnv):
     """With no valid action."""
 
@@ -136,6 +144,7 @@ gym.register("toy-lockstep-v0", entry_point="toy_env:ToyEnv", vector_entry_point
 gym.register("toy-sites-v0", entry_point="toy_env:ToyEnv", kwargs={"with_site": True})
 gym.register("toy-centred-v0", entry_point="toy_env:ToyEnv", kwargs={"offset": 0.6})
 gym.register("loose-toy-v0", entry_point="toy_env:LooseToyEnv")
+gym.register("thawless-toy-v0", entry_point="toy_env:ThawlessToyEnv")
 gym.register("hopeless-toy-v0", entry_point="toy_env:HopelessToyEnv")
 
 
