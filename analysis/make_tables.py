@@ -138,7 +138,12 @@ def main(args: Args) -> None:
         write_table(folder / name_of(module), table, text)
         if module is main_results:
             print(f"{EXPLANATION}\n")
-            print(text.loc[(table.seeds > 0).to_numpy(), list(main_results.TERMINAL)].to_string(index=False))
+            shown = text[list(main_results.TERMINAL)]
+            print(shown[(table.seeds > 0).to_numpy()].to_string(index=False))
+            keys = zip(table.method, table.environment, table.setting, strict=True)
+            own = [key in results.own for key in keys]
+            if any(own) and args.runs_dir is None:
+                print(f"\nYours, once more:\n\n{shown[own].to_string(index=False)}")
             elsewhere = [run for run in results.runs if run.arguments["env_id"] not in main_results.ENVIRONMENTS]
             if elsewhere:
                 places = "detailed_objectives*.md, those of three and more objectives in main_results_*.md too"

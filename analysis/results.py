@@ -214,11 +214,19 @@ class Results:
         table = of_environment(self.constant_plans, env_id)
         return table if len(table) else None
 
+    @cached_property
+    def own(self) -> dict[tuple, list[runs.Run]]:
+        """The rows that have runs which are not the archive's, and those runs."""
+        archive, own = paths.there(paths.archive()).absolute(), {}
+        for key, replicates in self.rows.items():
+            of_row = [run for one in replicates for run in one.runs if archive not in run.folder.absolute().parents]
+            own |= {key: of_row} if of_row else {}
+        return own
+
     def of_several_sources(self) -> list[str]:
-        """A line for each row, of runs that are not the archive's, whose seeds several versions of a script trained."""
-        archive, lines = paths.archive().absolute(), []
-        for (script, *_), replicates in self.rows.items():
-            runs_of = [run for one in replicates for run in one.runs if archive not in run.folder.absolute().parents]
+        """A line for each row of `own` whose seeds were trained by several versions of a script."""
+        lines = []
+        for (script, *_), runs_of in self.own.items():
             seeds: dict[str | None, list[str]] = {}
             for run in runs_of:
                 seeds.setdefault(run.config.get("source"), []).append(str(run.arguments["seed"]))

@@ -94,5 +94,8 @@ def test_seeds_of_two_versions_of_a_script_are_named(tmp_path):
         write_run(folder, "ppo_group", seed=seed)
         config = json.loads((folder / "config.json").read_text())
         (folder / "config.json").write_text(json.dumps({**config, "source": source}))
-    (line,) = Results.load(False, (tmp_path,)).of_several_sources()
+    results = Results.load(False, (tmp_path,))
+    (line,) = results.of_several_sources()
     assert "its seeds were trained by 2 versions of ppo_group.py: 1 3, and 2; --overwrite" in line
+    assert list(results.own) == [("ppo_group", "boreal-generalist-v0", "default")]
+    assert Results.load(False, (RUNS / "plan_regression",)).own == {}  # the archive's
