@@ -76,7 +76,7 @@ def test_a_run_writes_draws_and_says_it(tmp_path, capsys, monkeypatch):
     expected = table.preference * table.carbon_gain + (1 - table.preference) * table.thaw_gain
     np.testing.assert_allclose(table.scalarized_gain, expected, atol=1e-5)
     assert "on 1 validation site after 50, 100 % of the training" in out
-    assert "min left, score" in out
+    assert "min left with evaluation, score" in out
     timing = pd.read_csv(tmp_path / "timing.csv")
     assert (timing.phase == "validation").sum() == 2
 
@@ -84,4 +84,4 @@ def test_a_run_writes_draws_and_says_it(tmp_path, capsys, monkeypatch):
 def test_the_time_left_has_what_comes_afterwards(capsys):
     progress = Progress("training", 10, "steps", then=lambda rate: 600.0)
     progress.show(10)
-    assert "10.0 min left" in capsys.readouterr().out
+    assert "10.0 min left with evaluation" in capsys.readouterr().out

@@ -38,9 +38,10 @@ class Progress:
             return
         self.shown = now
         rate = (done - self.done_before) / (now - self.start)
+        afterwards = self.then(rate)
         line = (
             f"{self.label} {done:,}/{self.total:,} {self.unit}, {rate:,.0f}/s, "
-            f"{((self.total - done) / rate + self.then(rate)) / 60:.1f} min left"
+            f"{((self.total - done) / rate + afterwards) / 60:.1f} min left{' with evaluation' if afterwards else ''}"
         )
         if self.note:
             line += f", {self.note}"
