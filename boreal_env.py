@@ -172,7 +172,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     the permafrost.
 
     ## Observation Space
-    `Box` of 105 values (generalist) or 43 (site-specific, without the 62 site parameters), float32;
+    `Box` of 105 values, or 43 in site-specific mode, without the 62 site parameters, float32;
     `boreal_env.OBSERVATION` has the name, unit, normalisation and limits of each, `observation_names` the names of
     those that this environment gives. The first is the preference for carbon (of m objectives the weights of the first
     m - 1; a single objective has none). Where two years are given, the most recent is first. Age fractions are of all
@@ -235,7 +235,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `hwp_half_life_years`: half-life of wood products (None: for ever)
     - `harvest_min_class`: youngest class that may be cut: "young" (from 21 years on), "mature" or "old"
     - `reward`: a `Reward`, or a dict of the constants to change
-    - `balanced`: whether `carbon_scale`, unless `reward` gives it, is 1.8 (`boreal-balanced-v0`) instead of 2
+    - `balanced`: of the reward alone: whether `carbon_scale`, unless `reward` gives it, is 1.8 (`boreal-balanced-v0`)
+      instead of 2; the ground's balance is `boundary`, `soil_carbon` and `weather`
     - `boundary`: "sampled" with the site, or "balanced" (`boreal-balanced-v0`): the temperature far below is the one
       at which no heat flows there under the site's own first stand, found by the spin-up, whatever the site's own.
       The observation shows it, and it may leave the sampled range of 268-272 K
@@ -337,7 +338,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
     def pareto_front(self, gamma: float) -> list[np.ndarray]:
         """The best known front of the episode, discounted returns (m,) each, as mo-gymnasium's environments have it.
 
-        Known for the published sites alone, after `reset(seed=)` of theirs: returns of the plans that
+        Known for the first 50 test sites alone, after `reset(seed=)` of theirs: returns of the plans that
         `analysis/best_plans.py` found for this very weather and these dice, which are played anew (seconds). A plan
         that is worth most at another `gamma` than 1 may be missing.
         """
@@ -373,9 +374,9 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
     `reset(options={"preference": for all or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`,
     where only stands of the mask start anew.
 
-    `group_size` neighbours share site, start, weather and disturbance dice in every episode, not the preference: all
-    but that are drawn from the seed of a group's first stand. The options "site" and "reset_mask" have to be the same
-    within a group. `threads`, one a core by default, share the stands.
+    `group_size` neighbours share site, start, weather and dice (draws of fire, insects and deaths) in every episode,
+    not the preference: all but that are drawn from the seed of a group's first stand. The options "site" and
+    "reset_mask" have to be the same within a group. `threads`, one a core by default, share the stands.
     """
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}

@@ -97,15 +97,15 @@ beside ours and never failed.
 **Verdicts.** A claim that one thing is more than another holds if the whole interval of the difference has its sign. It
 does not if the interval has the other sign or, whatever its sign, no effect worth the name in it: of a return a quarter
 of what the best constant plans gain over doing nothing (25 points of score), of how far a preference is followed a
-quarter of what the best plans' return changes by from weight 0 to 1, of what has the paper's units a quarter of its
-effect, of a ratio of spreads a tenth, of a growing season a day. That is much: planting 100 stems a year blindly and
-the best constant plan are less far apart. Beyond that signs are judged, not sizes: how large the paper's difference is
-stands beside ours. A value or a range is met if all of our interval lies in it, give or take a tenth, and not if all of
-it lies outside. A cost is met if ours is no larger. A claim of several parts does not hold if one of them does not, and
-one that can be read in two ways is undecided where the two part. A bootstrap over few seeds is too narrow (of normal
-values it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five, and for the t interval of the
-seeds' mean to agree. Dozens of intervals are judged one by one, uncorrected. Those over training seeds hold for these
-evaluation sites: other sites are another matter.
+quarter of what the best constant plans' return changes by from weight 0 to 1, of what has the paper's units a quarter
+of its effect, of a ratio of spreads a tenth, of a growing season a day. That is much: planting 100 stems a year blindly
+and the best constant plan are less far apart. Beyond that signs are judged, not sizes: how large the paper's difference
+is stands beside ours. A value or a range is met if all of our interval lies in it, give or take a tenth, and not if all
+of it lies outside. A cost is met if ours is no larger. A claim of several parts does not hold if one of them does not,
+and one that can be read in two ways is undecided where the two part. A bootstrap over few seeds is too narrow (of
+normal values it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five, and for the t interval
+of the seeds' mean to agree. Dozens of intervals are judged one by one, uncorrected. Those over training seeds hold for
+these evaluation sites: other sites are another matter.
 """
 
 

@@ -28,7 +28,8 @@ FINAL_INFO = {
     ),
     "episode_seed": (
         "",
-        "of the start, the weather and the dice, as in `sim.simulate(seed=)`; in site-specific mode "
+        "of the start, the weather and the dice, as in `sim.simulate(seed=)`, drawn by the reset's seed, which is "
+        "`seed` of evaluation.csv; in site-specific mode "
         "the `site_seed`, 0 without one",
     ),
     "preference": ("1", "weight of carbon that was observed; of m objectives, not two, an array of all m"),
@@ -69,13 +70,15 @@ paper is silent.
 are those of the value *x* in its unit, from physics. Names that end in `2yr` are of the year before last. The `site_`
 entries are the 62 parameters of `sim/site_parameters.csv`, scaled by the ranges that they are sampled from. Of the last
 year,
-- `total_change` is that of biomass, dead wood, soil and wood products, `products_stored` what went into products,
-- `thinning_loss` is the carbon of all that was cut, the part that became products included,
+- `carbon_stock` is of trees, dead wood and soil; `total_change` has wood products besides,
+- `products_stored` is what went into products, `hwp_stored_kgc_m2` of the record (harvested wood products),
+- `thinning_loss` is the carbon of all that was cut, products included, `harvest_kgc_m2` of the record,
 - `density_change` is what was carried out of the action, `mix_change` how much the action changed the conifer fraction
   of the stand (without a density change 0 but for round-off).
 
-Where it never snows the drought index can grow without end; it is observed up to its limit. Within the 1000 years that
-`years` allows, or with constants at their ends, carbon stocks can pass theirs.
+`growing_season_length` is a site's `fall_start_day` less `growth_start_day`, another thing than `growing_season_days`
+of the last info. Where it never snows the drought index can grow without end; it is observed up to its limit. Within
+the 1000 years that `years` allows, or with constants at their ends, carbon stocks can pass theirs.
 
 Before the first year both indices are those of an action that changes nothing: the middle density, the nearest mix.
 

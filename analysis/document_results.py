@@ -385,7 +385,7 @@ def splits(results: Results) -> str:
         ]
         only = "" if len(worlds) == 2 else f"; only where the boundary is {worlds[0]}"
         rows.append([f"`{name}`", "those of `test`", "; ".join(parts) + only])
-    return excerpts.markdown(["split", "seeds", "sites"], rows)
+    return excerpts.markdown(["split", "reset with", "sites"], rows)
 
 
 def on_other_sites(results: Results) -> str:

@@ -288,9 +288,10 @@ class Experiment(NamedTuple):
 
 EXPERIMENTS = {
     "main": Experiment(
-        main_table, "main table: fixed strategies and plans; the paper's methods and group PPO, 10 seeds"
+        main_table,
+        "main table, on `boreal-generalist-v0`: fixed strategies and plans, the paper's methods, group PPO, 10 seeds",
     ),
-    "balanced": Experiment(balanced, "the same where both objectives weigh alike"),
+    "balanced": Experiment(balanced, "the same on `boreal-balanced-v0`"),
     "group": Experiment(group, "group PPO with one choice changed, such as the size of groups"),
     "outside": Experiment(outside, "algorithms of other libraries, on both tasks"),
     "planners": Experiment(planners, "NSGA-II and MOEA/D over a small policy, on both tasks"),

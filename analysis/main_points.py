@@ -1,8 +1,8 @@
 """What README.md and docs/results.md say first: rows of the main table, and what all its rows say, in words.
 
 Methods are compared with each other and with one plan that looks at nothing by the interval of their difference on the
-same sites, over training seeds and sites; with 100, the best plans of these sites, by the interval of the score, in
-which every drawn set of sites has its own best plans.
+same sites, over training seeds and sites; with 100, the best constant plans of these sites, by the interval of the
+score, in which every drawn set of sites has its own.
 """
 
 import textwrap
@@ -251,8 +251,8 @@ def of_longer_trainings(results, env_id: str, best_plans: list) -> str:
         text += f"{side}."
     if longer:
         more = listed([points(replicates, best_plans, best_plans) for replicates in longer.values()])
-        text += " These intervals are of sites like these, which have other best plans and so another 100. Against the "
-        text += f"best plans of these very sites, taken as given, it gains {more} points more."
+        text += " These intervals are of sites like these, which have other best constant plans and so another 100. "
+        text += f"Against those of these very sites, taken as given, it gains {more} points more."
     return text
 
 

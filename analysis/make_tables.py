@@ -60,7 +60,8 @@ SHOWN = 3  # commands of what is not there
 EXPLANATION = """Score: 0 is to do nothing, 100 the best constant plan of each weight. Interquartile mean over training
 seeds [95 % bootstrap interval, of score and gain over seeds and sites]; of the weighted sum, whatever the utility of a
 training. Seeds to tell 0.1: how many training seeds each of two methods needs for a t test (5 %) to find a difference
-of 0.1 in gain with a power of 80 %."""
+of 0.1 in gain with a power of 80 %. Compare methods by gain hypervolume: `hypervolume` and `sparsity` of the table's
+files are of returns above (-2, -2), as the paper has them."""
 
 
 @dataclass

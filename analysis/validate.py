@@ -77,6 +77,7 @@ PARTS: dict[str, tuple[str, Callable[[Args], Part]]] = {
 
 INTRODUCTION = """# Validation
 
+Of the physics, against what was measured (validation *sites*, to choose methods by, are in [planners.md](planners.md)).
 Written by `python analysis/validate.py`; every modelled number is from that run, but for the paragraph on constants in
 part 8, which is from `python analysis/studies/planting_signs.py`. Numbers of the literature and remarks on the records
 were written by hand. Observations, with their sources and licences, are in

@@ -1,4 +1,4 @@
-"""Fixed strategies of the paper, each a function of the observations, and the command line they share."""
+"""Fixed strategies, four of the paper and random actions, as functions of the observations, and their command line."""
 
 import time
 from dataclasses import dataclass

@@ -45,7 +45,7 @@ class Args:
     ideal_point: tuple[float, ...] | None = None
     """of chebyshev, a return for each objective (None: that of the constant plan which is best in it)"""
     utility: Literal["total", "future"] = "future"
-    """what weights an action's gradient: utility of the whole return, accrued and future, or of the rewards to come"""
+    """what weights an action's gradient: utility (--scalarization) of the whole return, or of what is to come"""
     baseline: Literal["none", "others"] = "none"
     """what is subtracted from a return: nothing, by the definition, or the mean of the batch's other episodes"""
     ent_coef: float = 0.0

@@ -67,7 +67,7 @@ class Args:
     """a value for each objective, whose advantages are normalised over the rollout before they are scalarised"""
     # CURRICULUM
     threshold: float = 0.5
-    """first value of the threshold tau: an episode is trained on when its site scores above it"""
+    """first value of the threshold tau: an episode is trained on if its site's selector score is above"""
     raw_selector: bool = False
     """score by the random network's own logit, neither centred nor scaled over sampled sites"""
     selector: Literal["network", "coin"] = "network"

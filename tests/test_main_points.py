@@ -85,7 +85,7 @@ def test_more_steps_are_a_row_of_their_own(results):
     assert rows[-2] == "| Group PPO, 1,000,000 steps | 5 | 110.0 [105.0, 115.0] | 110.0 [105.0, 115.0] |"
     words = " ".join(main_points.in_words(results).split())
     assert "With 1,000,000 steps and 5 training seeds Group PPO scores 110.0 [105.0, 115.0], above 100. These" in words
-    assert "Against the best plans of these very sites, taken as given, it gains 10.0 points more." in words
+    assert "Against those of these very sites, taken as given, it gains 10.0 points more." in words
 
 
 def test_the_words_follow_from_the_numbers(results):

@@ -100,9 +100,9 @@ def test_runs_that_were_not_timed_are_in_no_number_of_runs():
         ],
     )
     table = runtime.make(results).set_index("quantity")
-    assert table.loc["gated PPO, generalist, 300 steps on one core: training", ["seeds", "ours"]].tolist() == [1, 2.0]
+    assert table.loc["PPO Gated, generalist, 300 steps on one core: training", ["seeds", "ours"]].tolist() == [1, 2.0]
     assert np.isnan(table.seeds["EUPG, generalist, 300 steps on one core: training"])  # run, and not timed
-    assert table.seeds["curriculum PPO, generalist, 300 steps on one core: training"] == 0
+    assert table.seeds["Curriculum PPO, generalist, 300 steps on one core: training"] == 0
 
 
 def test_season_violations_runtime_details(tables):
@@ -120,7 +120,7 @@ def test_season_violations_runtime_details(tables):
     # of the six orders of three points one has no violation, two have one, three have two
     assert violations.noise_violations_percent == pytest.approx(100 * (0 + 1 + 1 + 1 + 1 + 2) / 12, abs=3)
     runtime = read(tables, "runtime", "quantity").ours
-    what = "curriculum PPO, generalist, 300,000 steps on one core"
+    what = "Curriculum PPO, generalist, 300,000 steps on one core"
     assert [runtime[f"{what}: {name}"] for name in ("training", "evaluation", "environment")] == pytest.approx(
         [0.2, 0.1, 75]
     )

@@ -105,7 +105,7 @@ def test_the_end_of_a_run_says_it(capsys):
     assert ["0.00", "8.00", "0.00", "1.00", "4.00", "plant", "100", "a", "year,", "100", "%", "conifers"] in rows
     assert ["SCORE", "70", "0", "30", "100"] in [row[:5] for row in rows]
     (followed,) = (line for line in lines if line.startswith("Preference 0 to 1 (carbon should rise, thaw fall): "))
-    assert "carbon -2.00 (best plans +4.00), thaw -8.00 (best plans -4.00)" in followed
+    assert "carbon -2.00 (best constant +4.00), thaw -8.00 (best constant -4.00)" in followed
     assert all(len(line) <= 120 for line in lines)
 
 

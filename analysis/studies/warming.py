@@ -231,7 +231,9 @@ def deepening(plans: pd.DataFrame) -> pd.DataFrame:
 def plan_name(action: int) -> str:
     """A plan in words."""
     change, mix = (float(value) for value in sim.management.decode(int(action)))
-    return "no change" if change == 0 else f"{'plant' if change > 0 else 'cut'} {abs(change):.0f}, {mix:.0%} conifers"
+    return (
+        "doing nothing" if change == 0 else f"{'plant' if change > 0 else 'cut'} {abs(change):.0f}, {mix:.0%} conifers"
+    )
 
 
 def held(ground: pd.Series) -> dict[str, int]:
@@ -283,7 +285,7 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         "by the warming that is reached. That is no threshold: the ground lags behind the warming, and "
         "without a scenario, too, it changes from decade to decade (below the figure):",
         drift(plans, years, today, first, last),
-        f"**How does that compare with what is published?** Under no change, {last} against the same years without a "
+        f"**How does that compare with what is published?** Doing nothing, {last} against the same years without a "
         "scenario. Thaw is the median, with its range, of the sites that are frozen in both; volume is of the sites "
         f"frozen in {today}, the last row of those frozen in {last} without a scenario.",
         "*What may explain what; none of it was tested.* Less is lost per K than AR6 says. The boundary of fixed "
@@ -294,8 +296,8 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         "and Stefan's equation. More sites are lost than Peng et al. "
         "lose of their area, and fewer than the middle of the IPCC's ranges under SSP1-2.6 and SSP5-8.5, though inside "
         "both.",
-        "**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of no change and of the best "
-        "plan for thaw alone, for both alike and for carbon alone; the share of sites whose best plan for both is "
+        "**How do the returns move?** Means over the sites of 50 years, carbon and thaw, of doing nothing and of the "
+        "best plan for thaw alone, for both alike and for carbon alone; the share of sites whose best plan for both is "
         "another one than without a scenario; and the share of years, of all plans, in which the thaw reward is "
         "clipped at -1.",
     )
@@ -325,7 +327,7 @@ def drift(plans: pd.DataFrame, years: pd.DataFrame, today: str, first: str, last
 
 def ground_table(table: pd.DataFrame, ground: pd.Series) -> str:
     """The answer by the warming reached."""
-    names = ("warming [K]", "scenario, years", "frozen under no change", "under some plan", "under no plan")
+    names = ("warming [K]", "scenario, years", "frozen, doing nothing", "under some plan", "under no plan")
     names += tuple(f"some plan, ground {name} ({count} sites)" for name, count in held(ground).items())
     rows = [
         (
@@ -375,7 +377,7 @@ def loss(last: pd.DataFrame, scenario: str) -> float:
 def returns_table(plans: pd.DataFrame) -> str:
     """What plans are worth by scenario."""
     moved = moved_sites(plans)
-    names = ("scenario", "no change", "best for thaw", "best for both", "best for carbon", "sites that change plan")
+    names = ("scenario", "doing nothing", "best for thaw", "best for both", "best for carbon", "sites that change plan")
     rows = [
         (
             scenario,

@@ -24,8 +24,8 @@ COLUMNS = {
     "seeds": "seeds",
     "score_greedy": "score, greedy",
     "score_sampled": "score, sampled",
-    "carbon_change": "carbon, weight 1 less 0",
-    "thaw_change": "thaw, weight 1 less 0",
+    "carbon_change": "more of carbon, weight 1 less 0",
+    "thaw_change": "more of thaw, weight 1 less 0",
 }
 
 

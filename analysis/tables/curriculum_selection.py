@@ -14,9 +14,9 @@ COLUMNS = {
     "share_percent": "of all episodes %",
     "latitude": "latitude (deg N)",
     "paper_latitude": "latitude (paper)",
-    "warming": "potential warming (MJ/m2/yr)",
-    "paper_warming": "potential warming (MJ, paper)",
-    "cooling": "potential cooling (MJ/m2/yr)",
+    "warming": "potential heat down at 12 m (MJ/m2/yr)",
+    "paper_warming": "potential heat down (MJ, paper)",
+    "cooling": "potential heat up at 12 m (MJ/m2/yr)",
     "thaw": "thaw return of zero change",
 }
 

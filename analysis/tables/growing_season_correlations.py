@@ -27,7 +27,7 @@ SEASON_PAIRS = {
 }
 COLUMNS = ROW_COLUMNS | {
     "variable": "variable",
-    "r": "r",
+    "r": "r, days between leaf dates",
     "paper_r": "r (paper, all methods)",
     "r_warm": "r, days above 5 °C",
     "r_gain": "r of the gain",

@@ -30,7 +30,7 @@ COLUMNS = ROW_COLUMNS | {
     "paper_carbon": "carbon (paper)",
     "thaw": "thaw",
     "paper_thaw_or_warming": "thaw (paper)",
-    "warming": "warming (MJ/m2/yr)",
+    "warming": "heat down at 12 m (MJ/m2/yr)",
     "paper_note": "the paper's note",
 }
 

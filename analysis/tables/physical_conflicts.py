@@ -41,7 +41,7 @@ COLUMNS = {
     "paper_carbon": "carbon (paper)",
     "paper_permafrost": "permafrost (paper)",
     "paper_conflict": "conflict (paper)",
-    "boundary_warming_mj_m2": "warming (MJ/m2/yr)",
+    "boundary_warming_mj_m2": "heat down at 12 m (MJ/m2/yr)",
     "ground_shortwave_mj_m2": "shortwave on ground (MJ/m2/yr)",
     "latent_heat_mj_m2": "latent heat (MJ/m2/yr)",
     "active_layer_depth_m": "active layer (m)",

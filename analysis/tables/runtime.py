@@ -10,8 +10,8 @@ MADE_BY = "python analysis/reproduce.py --only main site"
 COLUMNS = {"quantity": "quantity", "unit": "unit", "seeds": "runs", "ours": "ours", "paper": "paper", "source": "from"}
 TRAINED = {  # our row -> experiment, script, the paper's row
     "EUPG, generalist": ("main", "eupg_var_lambda", "training_generalist_300k_steps"),
-    "gated PPO, generalist": ("main", "ppo_gated", "training_generalist_300k_steps"),
-    "curriculum PPO, generalist": ("main", "ppo_curriculum", "training_generalist_300k_steps"),
+    "PPO Gated, generalist": ("main", "ppo_gated", "training_generalist_300k_steps"),
+    "Curriculum PPO, generalist": ("main", "ppo_curriculum", "training_generalist_300k_steps"),
     "EUPG, site-specific": ("site", "eupg_fixed_lambda", "training_site_specific_100k_steps"),
 }
 PHASES = ("rollout", "update", "evaluation")

@@ -26,7 +26,7 @@ COLUMNS = {
     "thaw": "thaw",
     "thaw_sd": "sd over episodes, thaw",
     "paper_thaw_mean": "thaw (paper)",
-    "hypervolume": "hypervolume",
+    "hypervolume": "hypervolume of returns",
     "paper_hypervolume": "hypervolume (paper)",
     "sparsity": "sparsity",
     "paper_sparsity": "sparsity (paper)",

@@ -10,10 +10,10 @@ FLUXES = {"boundary_warming_mj_m2": "warming", "boundary_cooling_mj_m2": "coolin
 COLUMNS = {
     "formulation": "formulation",
     "seeds": "seeds",
-    "warming": "warming (MJ/m2/yr)",
-    "paper_warming": "warming (MJ, paper)",
-    "cooling": "cooling (MJ/m2/yr)",
-    "zero_change_warming": "warming, zero change",
+    "warming": "heat down at 12 m (MJ/m2/yr)",
+    "paper_warming": "heat down (MJ, paper)",
+    "cooling": "heat up at 12 m (MJ/m2/yr)",
+    "zero_change_warming": "heat down, zero change",
 }
 
 

@@ -25,7 +25,7 @@ from sim.task.preference import check_weights
 
 ENVIRONMENTS = {
     "boreal-balanced-v0": "the task to study policies with",
-    "boreal-generalist-v0": "the paper's: a new site in every episode",
+    "boreal-generalist-v0": "the paper's; as in all but the next, a new site in every episode",
     "boreal-site-specific-v0": "the paper's: one fixed site",
     "boreal-timber-v0": "the balanced task with a third objective, timber",
     "boreal-four-v0": "and with a fourth, biodiversity",
@@ -70,7 +70,9 @@ def arguments(argv: list[str]) -> argparse.Namespace:
     watch.add_argument("--script", type=Path, help="the script that trained it, if not of cleanrl_style/")
     watch.add_argument("--preference", type=float, nargs="+", help="carbon weight, or one an objective (all equal)")
     watch.add_argument("--site-seed", type=int, help="the site, as sim.sample_site(seed) draws it (the seed's own)")
-    watch.add_argument("--seed", type=int, default=0, help="of weather, first stand and dice (0)")
+    watch.add_argument(
+        "--seed", type=int, default=0, help="of weather, first stand and dice, without --site-seed of the site too (0)"
+    )
     watch.add_argument("--env-id", help="another environment than the policy was trained on")
     watch.add_argument("--sampled", action="store_true", help="draw actions instead of the most probable ones")
     watch.add_argument("--window", action="store_true", help="show it in a window, instead of writing a GIF")

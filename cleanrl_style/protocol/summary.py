@@ -69,7 +69,8 @@ def print_score(objectives, comparison: Comparison, trained: bool = True) -> Non
     whose = objectives[0] if len(objectives) == 2 else ""
     if len(objectives) > 2:
         print(f"weights of {', '.join(objectives)}")
-    heads = (whose, "agent,", "agent,", "+100", "best"), ("weight", *POLICIES, "a year", "constant")
+    who = "agent," if trained else "strategy,"
+    heads = (whose, who, who, "+100", "best"), ("weight", *POLICIES, "a year", "constant")
     for (first, *others), words in zip(heads, ("", "  plan, which is to"), strict=True):
         print(f"{first:>{label}}" + "".join(f"{head:>{WIDTH}}" for head in others) + words)
     for (key, values), plan, wanted in zip(table[shown].iterrows(), comparison.best_plans, chosen, strict=True):
@@ -108,7 +109,7 @@ def followed(objectives, comparison: Comparison) -> str:
         what = f"Preference {first:g} to {last:g} ({objectives[0]} should rise, {objectives[1]} fall)"
     ours, best = (change(comparison.gains[name]) for name in (PRIMARY, "best"))
     changes = (
-        f"{objective} {one:+z.2f} (best plans {other:+z.2f})"
+        f"{objective} {one:+z.2f} (best constant {other:+z.2f})"
         for objective, one, other in zip(objectives, ours, best, strict=True)
     )
     return f"{what}: {', '.join(changes)}"
@@ -190,7 +191,7 @@ def _draw_gains(figure, ax, objectives, comparison: Comparison) -> None:
     ax.axhline(0, color="black", linewidth=0.8)
     ax.annotate("doing nothing (0)", (0.02, 0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8)
     label = f"{objectives[0]} weight" if len(objectives) == 2 else "weight (number in the table)"
-    ax.set(xlabel=label, ylabel="scalarized gain", title="evaluation, gain over doing nothing")
+    ax.set(xlabel=label, ylabel="weighted gain", title="evaluation, gain over doing nothing")
     ax.xaxis.get_major_locator().set_params(integer=len(objectives) != 2)
     ax.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
 
@@ -204,7 +205,7 @@ def _draw_course(axes, objectives, course: Course, table: pd.DataFrame) -> None:
     lines = (("best", ":", "best constant plan of each weight (100)"), ("plus_100", "--", "+100 a year"))
     for name, style, label in lines:
         ax.axhline(marks[name].scalarized_gain.mean(), linestyle=style, color="black", label=label)
-    ax.set(ylabel="scalarized gain", title=f"training, gain over doing nothing on {course.where}")
+    ax.set(ylabel="weighted gain", title=f"training, gain over doing nothing on {course.where}")
     for one, column in zip(others, gain_columns(objectives), strict=False):
         for k, (key, rows) in enumerate(table.groupby(weights)):
             label, colour = f"{objectives[0]} weight " if len(key) == 1 else "weights ", f"C{k}"

@@ -173,7 +173,7 @@ class Task:
         sites = boreal_env.sample_site_observations(site_seeds)
         if sites.shape[1] != len(self.site_entries):
             own = f"--env-id {self.env_id}: it observes {len(self.site_entries)} site parameters, ours {sites.shape[1]}"
-            fail(f"{own}, whose sites scores are centred by; --raw-selector does without")
+            fail(f"{own}, whose sites the selector's scores are centred by; --raw-selector does without")
         return sites
 
     def make(self, **kwargs) -> gym.Env:

@@ -35,7 +35,7 @@ class Utility(ABC):
 class Linear(Utility):
     """The weighted sum of returns."""
 
-    title: ClassVar[str] = "reward"
+    title: ClassVar[str] = "weighted return"
 
     def __call__(self, returns: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Utility (...) of returns (..., m) at weights (..., m)."""

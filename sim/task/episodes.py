@@ -32,7 +32,7 @@ from sim.task.timber import TIMBER_COLUMNS, Timber, countries
 #: A new site each episode, whose parameters are observed; or a fixed one.
 MODES = ("generalist", "site-specific")
 
-#: The world of `boreal-balanced-v0`, as arguments of an environment or of `sim.Stands`.
+#: The world of `boreal-balanced-v0`, as arguments of an environment or of `sim.Stands`; its reward's scale is no part.
 BALANCED_WORLD = {"boundary": "balanced", "soil_carbon": "balanced", "weather": "observed"}
 #: Length of an episode.
 DEFAULT_YEARS = 50
