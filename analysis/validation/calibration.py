@@ -135,13 +135,13 @@ def report(wet_share: dict[str, float], snowfall_unscaled_mm: float, repeats: in
             what = f"`{name}` is {cells[0]}, calibrated again {cells[1]} and {cells[2]}"
             misses.append(Miss("calibration", what, "another weighting of the records"))
     text = f"""Calibrated on these records are `snowfall_scale`, `clearness_*`, `cloud_*` and `humidity_*` (below), the
-persistence and warmest day of temperature, and `priestley_taylor_conifer` (at the end); of the weather as observed
-`noise_factor_*`, `wet_day_factor` and `wind_spread`, too. What follows from one of these has the verdict *in,
-calibrated* above. `sublimation_exposure` was raised to its limit of 1, `flammability_*` to the return of fire. Half A
-is the even years (US-Prr, ERA-Interim) or days (SE-Svb, FI-Sod), half B the odd ones. A constant misses if it is more
-than {STABLE:g} from the mean of both. Persistence and warmest day are not calibrated again by halves, nor are the
-constants of the weather as observed (`clearness_observed_*` and `cloud_observed_*` among them); its wind is compared
-nowhere.
+persistence, warmest day and `diurnal_full_sun` of temperature, and `priestley_taylor_conifer` (at the end); of the
+weather as observed `noise_factor_*`, `wet_day_factor` and `wind_spread`, too. What follows from one of these has the
+verdict *in, calibrated* above. `sublimation_exposure` was raised to its limit of 1, `flammability_*` to the return of
+fire. Half A is the even years (US-Prr, ERA-Interim) or days (SE-Svb, FI-Sod), half B the odd ones. A constant misses if
+it is more than {STABLE:g} from the mean of both. Persistence, warmest day and `diurnal_full_sun` are not calibrated
+again by halves, nor are the constants of the weather as observed (`clearness_observed_*` and `cloud_observed_*` among
+them); its wind is compared nowhere.
 
 {document.table(["constant", "in use", "half A", "half B", "mean less in use", "verdict"], rows)}
 
