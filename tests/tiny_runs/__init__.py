@@ -56,19 +56,8 @@ def write_run(
         shutil.copy(TINY_RUNS / "curriculum" / f"{name}.csv", folder)
     if preference is not None:
         not_default["preference"] = preference
-    arguments = {
-        "seed": seed,
-        "env_id": env_id,
-        "thaw_formulation": "asymmetric",
-        "site_seed": None,
-        "mode": "generalist",
-        "eval_weights": list(weights),
-        "eval_episodes": 2,
-        **({"total_timesteps": 300_000} if trains else {}),
-        **not_default,
-    }
-    config = {"script": script, "arguments": arguments, "not_default": not_default, "physics": physics_name()}
-    (folder / "config.json").write_text(json.dumps(config))
+    steps = {"total_timesteps": 300_000} if trains else {}
+    write_config(folder, script, seed, env_id, list(weights), steps, not_default)
 
 
 def write_run_of_three(folder, script, returns, seed=1, env_id="timber_env:timber-v0"):
@@ -94,15 +83,12 @@ def write_run_of_three(folder, script, returns, seed=1, env_id="timber_env:timbe
         if trains or name != "episodes":
             pd.DataFrame(rows).to_csv(folder / f"{name}.csv", index=False)
     shutil.copy(TINY_RUNS / "curriculum" / "timing.csv", folder)
-    arguments = {
-        "seed": seed,
-        "env_id": env_id,
-        "thaw_formulation": "asymmetric",
-        "site_seed": None,
-        "mode": "generalist",
-        "eval_weights": corners.tolist(),
-        "eval_episodes": 2,
-        **({"total_timesteps": 200} if trains else {}),
-    }
-    config = {"script": script, "arguments": arguments, "not_default": {}, "physics": physics_name()}
+    write_config(folder, script, seed, env_id, corners.tolist(), {"total_timesteps": 200} if trains else {}, {})
+
+
+def write_config(folder, script, seed, env_id, weights, steps, not_default):
+    """The config.json of a run that is evaluated on two episodes."""
+    arguments = {"seed": seed, "env_id": env_id, "mode": "generalist", "site_seed": None, "eval_weights": weights}
+    arguments |= {"thaw_formulation": "asymmetric", "eval_episodes": 2, **steps, **not_default}
+    config = {"script": script, "arguments": arguments, "not_default": not_default, "physics": physics_name()}
     (folder / "config.json").write_text(json.dumps(config))
