@@ -1,4 +1,4 @@
-"""Finds the best known plans of the first evaluation sites, which ship with the code: fronts, and what is best there.
+"""Finds the best known plans of the first test sites, which ship with the code: fronts, and what is best there.
 
     python analysis/best_plans.py            # an hour of processor time; a stopped search goes on with the next site
 

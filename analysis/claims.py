@@ -76,7 +76,7 @@ agree; what a method can do, what comes out ahead, and which way a mechanism wor
 says why, as far as an experiment tells.
 
 **Numbers.** Ours are of `boreal-generalist-v0`, the paper's task, where a row names no other. They are interquartile
-means over training seeds, of the policy that the runs name primary, the greedy one, on the same evaluation sites and
+means over training seeds, of the policy that the runs name primary, the greedy one, on the same test sites and
 weathers, with 95 % intervals: bootstrap and t, each end of the one that reaches further. Differences are paired by seed
 between runs of one script, and between Curriculum and PPO Gated, which train on the same episodes; between others each
 side's seeds are its own. Returns are sums over 50 years; gains are returns less those of zero change on the same
@@ -105,7 +105,7 @@ of it lies outside. A cost is met if ours is no larger. A claim of several parts
 and one that can be read in two ways is undecided where the two part. A bootstrap over few seeds is too narrow (of
 normal values it covers nine tenths with five seeds instead of 95 %), so verdicts ask for five, and for the t interval
 of the seeds' mean to agree. Dozens of intervals are judged one by one, uncorrected. Those over training seeds hold for
-these evaluation sites: other sites are another matter.
+these test sites: other sites are another matter.
 """
 
 

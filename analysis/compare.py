@@ -44,13 +44,10 @@ def row_of(folder: Path) -> tuple[tuple, list[Replicate]]:
     for problem in results.left_out:
         print(f"left out: {problem}", file=sys.stderr)
     if len(rows) != 1:
-        found = ", ".join(sorted({str(run.folder.parent) for run in results.runs}))
-        fail(
-            fail(
-                f"{folder} holds "
-                + (f"runs of {len(rows)} settings; give one of {found}" if rows else "no finished run")
-            )
-        )
+        parents = sorted({str(run.folder.parent) for run in results.runs})
+        which = parents if len(parents) >= len(rows) else [str(run.folder) for run in results.runs]
+        what = f"runs of {len(rows)} settings; give one of {', '.join(which)}" if rows else "no finished run"
+        fail(f"{folder} holds {what}")
     [(key, replicates)] = rows.items()
     if any(one.plans is None for one in replicates):
         fail(
@@ -65,11 +62,11 @@ def row_of(folder: Path) -> tuple[tuple, list[Replicate]]:
     return key, replicates
 
 
-def evaluated(key: tuple, row: list[Replicate]) -> str:
-    """How a row was evaluated, by its flags."""
-    arguments = row[0].runs[0].arguments
-    weights = " ".join(" ".join(f"{w:g}" for w in np.ravel(weight)) for weight in arguments["eval_weights"])
-    return f"--env-id {key[1]} --eval-weights {weights} --eval-episodes {arguments['eval_episodes']}"
+def evaluated(key: tuple, row: list[Replicate], weights: np.ndarray) -> str:
+    """How a row was evaluated at these weights (n, m), by its flags."""
+    shown = weights[:, :1] if weights.shape[1] == 2 else weights
+    episodes = row[0].runs[0].arguments["eval_episodes"]
+    return f"--env-id {key[1]} --eval-weights {' '.join(f'{w:g}' for w in shown.ravel())} --eval-episodes {episodes}"
 
 
 def gains_on_sites(replicates: list[Replicate], policy: str) -> tuple[np.ndarray, np.ndarray]:
@@ -90,7 +87,7 @@ def main(args: Args) -> None:
     """Print both scores and their difference, greedy and sampled."""
     (key, first), (other, second) = row_of(args.first), row_of(args.second)
     weights = [np.unique(metrics.weights_of(row[0].evaluation), axis=0) for row in (first, second)]
-    how = f"{evaluated(key, first)}, and {evaluated(other, second)}"
+    how = f"{evaluated(key, first, weights[0])}, and {evaluated(other, second, weights[1])}"
     if key[1] != other[1] or not np.array_equal(*weights):
         fail(f"the two were evaluated differently: {how}")
     gains = {policy: [gains_on_sites(row, policy) for row in (first, second)] for policy in protocol.POLICIES}

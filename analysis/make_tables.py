@@ -143,7 +143,7 @@ def main(args: Args) -> None:
             print(shown[(table.seeds > 0).to_numpy()].to_string(index=False))
             keys = zip(table.method, table.environment, table.setting, strict=True)
             own = [key in results.own for key in keys]
-            if any(own) and args.runs_dir is None:
+            if any(own) and args.runs_dir is None and not args.quick:
                 print(f"\nYours, once more:\n\n{shown[own].to_string(index=False)}")
             elsewhere = [run for run in results.runs if run.arguments["env_id"] not in main_results.ENVIRONMENTS]
             if elsewhere:

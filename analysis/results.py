@@ -227,11 +227,11 @@ class Results:
         """A line for each row of `own` whose seeds were trained by several versions of a script."""
         lines = []
         for (script, *_), runs_of in self.own.items():
-            seeds: dict[str | None, list[str]] = {}
+            seeds: dict[str | None, set[int]] = {}
             for run in runs_of:
-                seeds.setdefault(run.config.get("source"), []).append(str(run.arguments["seed"]))
+                seeds.setdefault(run.config.get("source"), set()).add(run.arguments["seed"])
             if len(seeds) > 1:
-                by = ", and ".join(" ".join(group) for group in seeds.values())
+                by = ", and ".join(" ".join(map(str, sorted(group))) for group in seeds.values())
                 lines.append(
                     f"{runs_of[0].folder.parent}: its seeds were trained by {len(seeds)} versions of {script}.py: "
                     f"{by}; --overwrite trains a run anew"

@@ -101,12 +101,13 @@ def policy_file(run_or_name) -> Path:
         raise ValueError(f"policy {run_or_name!r}: a run's folder, a file, or the name of one that ships is allowed")
     path, ships = Path(run_or_name), shipped_policies()
     if os.path.isdir(path):  # a name too long for the file system is no folder; Path's own would raise
+        runs = sorted(path.glob(f"seed*/{POLICY}"))
         path = path / POLICY
+        if runs and not path.exists():
+            raise FileNotFoundError(f"{run_or_name} holds runs: give one of them, such as {runs[0].parent}")
     if not os.path.exists(path):
         path = ships.get(str(run_or_name), path)
     if not os.path.isfile(path):
-        if runs := sorted(path.parent.glob(f"seed*/{POLICY}")):
-            raise FileNotFoundError(f"{path.parent} holds several runs: give one of them, such as {runs[0].parent}")
         raise FileNotFoundError(
             f"{run_or_name or repr('')}: neither the folder of a finished run, with {POLICY}, nor such a file, nor a "
             f"policy that ships ({', '.join(ships) or 'none does yet'})"
@@ -179,10 +180,12 @@ def message_of(box: str) -> str:
 
 def way_on(word: str) -> str:
     """What to do about a word of the command line that is no flag."""
-    before = sys.argv[sys.argv.index(word) - 1] if word in sys.argv[2:] else ""
-    if word.startswith("-") or not before.startswith("--"):
+    before = [before for before, after in itertools.pairwise(sys.argv) if after == word]
+    if word.startswith("-") or len(before) != 1 or not before[0].startswith("--") or "=" in before[0]:
         return "--help lists all"
-    return f"{before} takes no value, {before.replace('--', '--no-', 1)} is its opposite"
+    name = before[0].removeprefix("--")
+    opposite = name.removeprefix("no-") if name.startswith("no-") else f"no-{name}"
+    return f"--{name} takes no value, --{opposite} is its opposite"
 
 
 def in_plain_words(message: str) -> str:

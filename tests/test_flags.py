@@ -92,6 +92,12 @@ def test_a_package_that_is_not_installed_is_named_with_the_command(monkeypatch, 
             ["--hide-site", "True"],
             "Unrecognized options: True; --hide-site takes no value, --no-hide-site is its opposite",
         ),
+        (
+            ["--no-hide-site", "True"],
+            "Unrecognized options: True; --no-hide-site takes no value, --hide-site is its .*",
+        ),
+        (["--seed=1", "extra"], "Unrecognized options: extra; --help lists all"),
+        (["--total-timesteps", "1", "--hide-site", "1"], "Unrecognized options: 1; --help lists all"),
         (["--lr", "0.1"], "Unrecognized options: --lr, 0.1; --help lists all"),
         (["--eval-episodes", "201"], "--eval-episodes 201: at most 200 are allowed, as many as there are test sites"),
         (

@@ -183,13 +183,13 @@ def means(years: pd.DataFrame, when: str) -> pd.DataFrame:
 
 
 def always_frozen(plans: pd.DataFrame) -> pd.Series:
-    """By site that no change keeps frozen in both decades without a scenario: the ground's temperature in the last."""
+    """By site that stays frozen in both decades without a scenario and a plan: the ground's temperature in the last."""
     rows = plans[(plans.scenario == NONE) & (plans.action == boreal_env.NO_CHANGE)].set_index("site_seed")
     return rows.deep_after_76_c[(rows.frozen_after_50 == 1) & (rows.frozen_after_76 == 1)]
 
 
 def kept(plans: pd.DataFrame, years: pd.DataFrame) -> pd.DataFrame:
-    """By warming, a row a scenario and decade: of the sites that are frozen without a scenario, how many no change
+    """By warming, a row a scenario and decade: of the sites that are frozen without a scenario, how many doing nothing
     keeps frozen, some plan and no plan; and how many some plan keeps, and the one plan that keeps most of them, by the
     ground's temperature (`GROUND`)."""
     ground = always_frozen(plans)
@@ -209,8 +209,8 @@ def kept(plans: pd.DataFrame, years: pd.DataFrame) -> pd.DataFrame:
 
 
 def deepening(plans: pd.DataFrame) -> pd.DataFrame:
-    """By scenario, thaw depth of no change in the last decade less that without a scenario, on sites that are frozen in
-    both: in m, and the median in parts; and of all that are frozen without one the share that is lost."""
+    """By scenario, thaw depth of doing nothing in the last decade less that without a scenario, on sites that are
+    frozen in both: in m, and the median in parts; and of all that are frozen without one the share that is lost."""
     rows = plans[plans.action == boreal_env.NO_CHANGE].set_index(["scenario", "site_seed"])
     frozen, depth = rows.frozen_after_76.unstack("scenario") == 1, rows.thaw_depth_after_76_m.unstack("scenario")
     found = {}

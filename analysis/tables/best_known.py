@@ -1,4 +1,4 @@
-"""How much of the best known plans of the evaluation sites each method reaches, with both policies.
+"""How much of the best known plans of the test sites each method reaches, with both policies.
 
 Of the sites that analysis/best_plans.py has searched. `share` is a gain over doing nothing in that of the best known
 plan, each a mean over sites before the division; NHGR and EUGR are means over sites of the ratios of

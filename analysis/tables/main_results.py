@@ -1,7 +1,7 @@
 """Main comparison: the score of every method, its other metrics, whether it follows the preference; constant plans.
 
 The score is 100 x the gain over doing nothing, over that of the best constant plan of each weight. Score and gain have
-intervals over training seeds and evaluation sites together, the rest over training seeds. `seeds to tell 0.1` is how
+intervals over training seeds and test sites together, the rest over training seeds. `seeds to tell 0.1` is how
 many a method it takes to tell another apart whose gain differs by so much. All but the sampled score is of the
 greedy policy.
 """

@@ -27,12 +27,12 @@ def report(sites: int) -> Part:
         for kind in (FOREST, "open")
     }
     _, balanced_rows, balanced_misses = _judged(balanced, ", `boreal-balanced-v0`")
-    biomass = ", ".join(number(stocks["biomass_kgc_m2"], 1) for kind, stocks in KINDS.items() if kind != "open")
+    biomass = ", ".join(f"{kind} {number(KINDS[kind]['biomass_kgc_m2'], 1)}" for kind in ALL if kind != "open")
     text = f"""{sites} sites drawn as for episodes of the environment, each with {SKIPPED_YEARS + KEPT_YEARS} years of
 its own weather, of which the last {KEPT_YEARS} are averaged; the same sites and weather for every stand. Stands are
 held: on every 1 January trees, dead wood, soil carbon and organic layer are put back to those of the start. Mature is
 1500 stems/ha of 41-100 years, young of 21-40, old of more than 100, half of each species where mixed; open ground has
-no stems. Biomass is {biomass} kgC/m2, dead wood what the stand's deaths keep up. Soil carbon is drawn, 2-10 kgC/m2 as
+no stems. Biomass [kgC/m2]: {biomass}; dead wood what the stand's deaths keep up. Soil carbon is drawn, 2-10 kgC/m2 as
 in an episode. No fire, no insects. Cells are the median over the sites (10-90 %), the verdict of the median and the
 share of sites in the band; no verdict where the band is not meant for the stand. So GPP and respiration of deciduous
 stands have none: of the towers one is in such a forest; NEP's is a wider choice. The summer

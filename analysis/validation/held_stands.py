@@ -18,9 +18,9 @@ NO_CHANGE = 10  # action 5 * 2 + 0: density index 2 leaves the stand alone
 MONTH = pd.date_range("2001-01-01", periods=DAYS).month.to_numpy()  # of each day of a year without leap day
 
 #: Kind -> first stocks. 1500 stems/ha of one age class are a closed stand. Biomass: interior Alaska, conifers 5.6 (mean
-#: of black spruce 3.2 and white spruce 8.0), deciduous 6.5 kgC/m2 (targets of DVM-DOS-TEM, Bonanza Creek); young stems
-#: a quarter of it, the ratio of their relative carbon (`sim.demography.stem_weight`). Soil carbon, which is not given,
-#: is drawn from the environment's 2-10 kgC/m2, the same for all kinds.
+#: of black spruce 3.2 and white spruce 8.0), deciduous 6.5 kgC/m2 (targets of DVM-DOS-TEM, the latter of Murphy Dome);
+#: young stems a quarter of it, the ratio of their relative carbon (`sim.demography.stem_weight`). Soil carbon, which is
+#: not given, is drawn from the environment's 2-10 kgC/m2, the same for all kinds.
 KINDS = {
     "mature conifer": {"conifer_mature_stems_ha": 1500.0, "biomass_kgc_m2": 5.6},
     "mature deciduous": {"deciduous_mature_stems_ha": 1500.0, "biomass_kgc_m2": 6.5},

@@ -328,8 +328,7 @@ def _spring(spread: Comparison, measured: Comparison) -> tuple[str, list[Miss]]:
         what = f"snow in March 2013: {number(100.0 * deep, 0)} cm deep, measured {number(depth, 0)}"
         found.append(Miss(spread.site, what, "too little snow (sublimation), and too dense"))
     text = f"""The spring of 2013 was measured in half-hours. The same run with them in place of the spread days
-    (precipitation
-stays spread):
+(precipitation stays spread):
 
 {document.table(header, rows)}
 

@@ -191,7 +191,7 @@ def _draw_gains(figure, ax, objectives, comparison: Comparison) -> None:
     ax.axhline(0, color="black", linewidth=0.8)
     ax.annotate("doing nothing (0)", (0.02, 0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8)
     label = f"{objectives[0]} weight" if len(objectives) == 2 else "weight (number in the table)"
-    ax.set(xlabel=label, ylabel="weighted gain", title="evaluation, gain over doing nothing")
+    ax.set(xlabel=label, ylabel="gain", title="evaluation, gain over doing nothing")
     ax.xaxis.get_major_locator().set_params(integer=len(objectives) != 2)
     ax.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
 
@@ -205,7 +205,7 @@ def _draw_course(axes, objectives, course: Course, table: pd.DataFrame) -> None:
     lines = (("best", ":", "best constant plan of each weight (100)"), ("plus_100", "--", "+100 a year"))
     for name, style, label in lines:
         ax.axhline(marks[name].scalarized_gain.mean(), linestyle=style, color="black", label=label)
-    ax.set(ylabel="weighted gain", title=f"training, gain over doing nothing on {course.where}")
+    ax.set(ylabel="gain", title=f"training, gain over doing nothing on {course.where}")
     for one, column in zip(others, gain_columns(objectives), strict=False):
         for k, (key, rows) in enumerate(table.groupby(weights)):
             label, colour = f"{objectives[0]} weight " if len(key) == 1 else "weights ", f"C{k}"
