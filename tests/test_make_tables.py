@@ -287,6 +287,18 @@ def test_rows_without_runs_are_named_with_their_command(tmp_path, capsys):
     assert "physical_conflicts: python analysis/" in out
 
 
+def test_ones_own_rows_stand_once_more_below_the_projects(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(paths, "there", lambda folder: tmp_path / folder)
+    write_run(tmp_path / "results" / "runs" / "zero_change", "zero_change")
+    write_run(tmp_path / "runs" / "mine", "ppo_group")
+    make_tables.main(make_tables.Args())
+    below = capsys.readouterr().out.split("Yours, once more:")[1]
+    assert re.findall(r"^ *(\w+) +boreal-", below, re.M) == ["ppo_group"]
+    make_tables.main(make_tables.Args(runs_dir=(tmp_path / "runs",)))
+    assert "Yours" not in capsys.readouterr().out
+
+
 def test_runs_that_cannot_be_used_are_named(tmp_path, capsys):
     runs = tmp_path / "runs"
     names = ("good", "unfinished", "config", "truncated", "columns", "infinite", "partial", "broken-years", "twin")
