@@ -34,7 +34,7 @@ EACH = 6  # new plans of a weight in a generation: of five weights nearly two fu
 
 @dataclass
 class Args:
-    """Finds the best known plans of published sites."""
+    """Finds the best known plans of test sites."""
 
     env_id: tuple[str, ...] = (experiments.GENERALIST, experiments.BALANCED)
     """environments, each with sites that are drawn"""

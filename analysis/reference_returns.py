@@ -1,10 +1,10 @@
-"""Measures what ships with the code: returns of the constant plans and fixed strategies on the published test sites,
+"""Measures what ships with the code: returns of the constant plans and fixed strategies on the test sites,
 and of the constant plans on the validation sites that a training's course is measured on.
 
     python analysis/reference_returns.py      # four minutes on two idle cores
 
 The score of every run is measured by them. A table that is of this physics is left as it is. After a change of the
-physics, or of the published sites, the tables that are there are not used until this is run again: a run then measures
+physics, or of the test sites, the tables that are there are not used until this is run again: a run then measures
 its own, and says so. Writes cleanrl_style/protocol/reference/<environment>.csv.gz.
 """
 

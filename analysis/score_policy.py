@@ -1,4 +1,4 @@
-"""Checks and scores a policy as the leaderboard does: on the published test sites of the default and the balanced task.
+"""Checks and scores a policy as the leaderboard does: on the test sites of the generalist and the balanced task.
 
     python analysis/score_policy.py runs/ppo_group/boreal-balanced-v0-vectorization=lockstep/seed1
     python analysis/score_policy.py their_policy.pt --script their_method.py --name "Their method" --add
@@ -27,7 +27,7 @@ SUBMITTED = ("config.json", "policy.pt", "evaluation.csv")  # what a run's folde
 
 @dataclass
 class Args:
-    """Checks and scores a policy on the published test sites."""
+    """Checks and scores a policy on the test sites."""
 
     policy: tyro.conf.Positional[Path]
     """folder of a run, policy file, or name of a policy that ships"""

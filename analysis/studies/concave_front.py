@@ -2,7 +2,7 @@
 
     python analysis/studies/concave_front.py      # seconds
 
-Every constant plan is played on one of the published sites, under its fixed weather. Of those that no other plan
+Every constant plan is played on one of the test sites, under its fixed weather. Of those that no other plan
 dominates some lie below the line between two others: at no preference a weighted sum takes them, Chebyshev's utility
 does. Writes results/studies/concave_front.csv (mean gains over doing nothing, and at how many of 101 preferences a plan
 is the best one) and docs/images/concave_front.png.
