@@ -53,6 +53,28 @@ def test_training_moves_every_layer(script, tmp_path):
         assert (trained[name] - first[name]).abs().max() > 1e-5, name
 
 
+def test_a_folder_of_several_runs_says_what_to_give(tmp_path):
+    (tmp_path / "seed1").mkdir()
+    (tmp_path / "seed1" / "policy.pt").write_bytes(b"")
+    with pytest.raises(FileNotFoundError, match=f"{tmp_path} holds runs: give one of them, such as {tmp_path}/seed1"):
+        protocol.load_policy(tmp_path)
+
+
+def test_a_finished_run_says_if_its_script_has_changed(tmp_path, capsys):
+    path = tmp_path / "ppo_own.py"
+    path.write_text((ROOT / "cleanrl_style" / "ppo_gated.py").read_text())
+    train(path, tmp_path / "run")
+    for changed, said in (
+        ("", "is finished (--overwrite starts over)"),
+        ("# more", "finished, but ppo_own.py has changed"),
+    ):
+        path.write_text(path.read_text() + changed)
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            train(path, tmp_path / "run")
+        assert end.value.code == 0 and said in capsys.readouterr().out
+
+
 def test_the_agent_of_a_script_elsewhere(tmp_path):
     path = tmp_path / "ppo_own.py"
     path.write_text((ROOT / "cleanrl_style" / "ppo_gated.py").read_text())
