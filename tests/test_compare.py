@@ -1,6 +1,7 @@
 """Two methods are compared by their difference on the same sites."""
 
 import json
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,6 +37,18 @@ def test_a_single_training_has_no_interval(capsys):
     folder = RUNS / "plan_regression" / BALANCED
     compare.main(compare.Args(folder / "seed1", folder))
     assert "[" not in capsys.readouterr().out.splitlines()[2]
+
+
+def test_scores_of_another_utility_than_the_weighted_sum_are_marked(tmp_path, capsys):
+    linear = RUNS / "ppo_gated" / BALANCED / "seed1"
+    chebyshev = tmp_path / "ppo_gated" / f"{BALANCED}-scalarization=chebyshev" / "seed1"
+    shutil.copytree(linear, chebyshev)
+    config = json.loads((linear / "config.json").read_text())
+    config["arguments"]["scalarization"] = config["not_default"]["scalarization"] = "chebyshev"
+    (chebyshev / "config.json").write_text(json.dumps(config))
+    compare.main(compare.Args(chebyshev, linear))
+    [marked] = [line for line in capsys.readouterr().out.splitlines() if "weighted sum" in line]
+    assert marked.startswith(f"{chebyshev}: ")
 
 
 @pytest.mark.parametrize(
