@@ -175,8 +175,9 @@ class BorealEnv(Described, gym.Env, EzPickle):
     `Box` of 105 values, or 43 in site-specific mode, without the 62 site parameters, float32;
     `boreal_env.OBSERVATION` has the name, unit, normalisation and limits of each, `observation_names` the names of
     those that this environment gives. The first is the preference for carbon (of m objectives the weights of the first
-    m - 1; a single objective has none). Where two years are given, the most recent is first. Age fractions are of all
-    stems: seedlings of 0-5 years, saplings 6-20, young 21-40, mature 41-100, old from 101.
+    m - 1, `preference_<objective>`; a single objective has none). Where two years are given, the most recent is
+    first. Age fractions are of all stems: seedlings of 0-5 years, saplings 6-20, young 21-40, mature 41-100, old from
+    101.
 
     ## Action Space
     `Discrete(25)`: action = 5 x density index + mix index; density changes (-100, -50, 0, 50, 100) stems/ha, conifer
@@ -184,9 +185,9 @@ class BorealEnv(Described, gym.Env, EzPickle):
     the remaining stand nears the mix. Without a change of density the mix has nothing to act on: 10 to 14 are alike,
     and 12 stands for doing nothing. `action_masks()` says which actions can be carried out in full; the others are
     legal, do what can be done, and cost a penalty. Planting ends at 2000 stems/ha, thinning at 150, and it cuts only
-    trees of `harvest_min_class` and older. What would end at 2000 exactly is masked, against rounding, but costs no
-    penalty. The density penalty is another: a stand at or above `density_limit` after the action costs it whatever
-    the action, valid or not.
+    trees of `harvest_min_class` and older. What would end at 2000 exactly is masked, against rounding, though it is
+    done in full. The density penalty is another: a stand at or above `density_limit` (2000) after the action costs it,
+    whatever the action, valid or not.
 
     ## Reward Space
     `Box(-1, 1, (2,))`: [carbon, thaw]. Carbon: net change of biomass, dead wood, soil and products over `carbon_scale`,
@@ -220,7 +221,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
 
     ## Arguments
     Where values are named, the first is the default.
-    - `mode`: "generalist" or "site-specific"
+    - `mode`: "generalist" or "site-specific" (one site: that of `site_seed`, else the middle of all ranges)
     - `years`: length of an episode (50)
     - `time_step_minutes`: a divisor of 1440, at most 120 (30)
     - `backend`: "numba", "python" (the same source, interpreted) or "cuda" (a GPU, for thousands)
@@ -252,8 +253,8 @@ class BorealEnv(Described, gym.Env, EzPickle):
     - `objectives`: of the reward vector, "carbon", "thaw" (these two), "active_layer", "permafrost_heat", "timber",
       "biodiversity" and any `Objective` of your own
     - `timber`: None, or prices and costs, which "timber" needs: "finland", "sweden" or "canada" of
-      `sim/timber_prices.csv`, a .csv with the same columns, or a dict of all its items in EUR; the record then has the
-      revenue, the last step's info the net present value
+      `sim/timber_prices.csv`, a .csv of one country with the same columns, or a dict of all its items in EUR; the
+      record then has the revenue, the last step's info the net present value
     - `discount_rate`: of that, a year's (0.03); without `timber` none is allowed
     - `mechanisms`: switches of the physics, see `sim.MECHANISMS`
     - `constants`: literature constants to override, see `sim/constants.csv`
@@ -264,7 +265,7 @@ class BorealEnv(Described, gym.Env, EzPickle):
 
     ## Reset and Step
     `reset(seed=, options={"preference": w, "site": {name: value}})`; what the site does not name is drawn, and
-    `sim.middle_site` names all. Seeds are at most 2^63 - 1, here and everywhere.
+    `sim.middle_site` names all. The option "preference" goes before `fixed_preference`. Seeds are at most 2^63 - 1.
     `info` is empty but for the last step, where it has the episode's totals (and for `record_steps`). Bad values raise
     ValueError, a step before reset or after the end RuntimeError (of `gym.make`, before reset, ResetNeeded).
 
@@ -371,8 +372,10 @@ class BorealVectorEnv(Described, VectorEnv, EzPickle):
 
     With the same seeds and actions it gives the trajectories of `num_envs` single environments. Episodes that end
     start anew within the step (`AutoresetMode.SAME_STEP`); infos then have `final_obs` and `final_info`.
-    `reset(options={"preference": for all or a sequence, "site": one dict or a sequence, "reset_mask": bool array})`,
-    where only stands of the mask start anew.
+    `reset(seed=s, options={"preference": for all or a sequence, "site": one dict or a sequence, "reset_mask": bool
+    array})`, where stand i has the seed s + i, or one of a sequence, and only stands of the mask start anew.
+    `action_masks()`, bool (num_envs, 25), is `call("action_masks")`, too; `weights()` are the preferences,
+    `stable_baselines3()` makes a VecEnv ([clients](clients.md)).
 
     `group_size` neighbours share site, start, weather and dice (draws of fire, insects and deaths) in every episode,
     not the preference: all but that are drawn from the seed of a group's first stand. The options "site" and

@@ -7,7 +7,7 @@ A split is the test or validation sites, or the test sites with one property, or
 that sites are drawn from (`sim/task/shifts.py`); "outside" is all of those. The test sites are always there, to compare
 with. A run is a finished one with its policy.pt; on the test sites its own evaluation counts, and an archived run will
 do. Printed are, for both policies, the score against the constant plans of the split, two ratios, and how much each
-drops outside; the ratios of every site are written. docs/results.md shows those of the policies that ship.
+drops outside; the ratios of every site are written. docs/results.md shows those of Group PPO's two that ship.
 
 The ratios are those of Teoh, Varakantham and Vamplew (2025, ICLR, "On generalization across environments in
 multi-objective reinforcement learning"): NHGR is the hypervolume of a policy's front over that of the site's best known

@@ -172,7 +172,7 @@ def sentences(table: pd.DataFrame, preference: float, years: int) -> str:
 
     most = (
         f" {thaw[far].sum() / thaw.sum():.0%} of that is of the {far.sum():,} stands where it changes by more than "
-        f"{FAR:g} m: without permafrost this depth is the boundary's, 12 m and more."
+        f"{FAR:g} m: the depth leaps by metres in years in which the deep soil passes 0 °C."
     )
     return (
         f"At a carbon weight of {preference:g} the policy plants {planted.mean():.0f} stems/ha a year, {conifers:.0%} "

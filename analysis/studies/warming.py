@@ -254,7 +254,7 @@ def answer(table: pd.DataFrame, ground: pd.Series) -> str:
         reached = [0.0, *rows.warming_k]
         lost = [k for k, sites in enumerate(rows[name], start=1) if sites < count / 2]
         between = reached[lost[0] - 1 :] if lost else reached[-1:]
-        where = ("between {:.1f} and {:.1f} K" if lost else "not by {:.1f} K").format(*between)
+        where = ("between {:.1f} and {:.1f} K" if lost else "even {:.1f} K does not").format(*between)
         sites = (f"{sites} at {warming:.1f} K" for warming, sites in zip(rows.warming_k, rows[name], strict=True))
         most = ", ".join(str(sites) for sites in rows[one_plan(name)])
         parts.append(
@@ -275,9 +275,9 @@ def page(plans: pd.DataFrame, years: pd.DataFrame) -> str:
         f"without a scenario and under three, from {start} to {end}, on {sites} sites; what a scenario is, is in "
         "[model.md](model.md), section 3. **Warming** is always that of boreal land against 1995-2014, in the mean of "
         "ten years; where it is the world's, that is said.",
-        f"**By {last}, how much warming takes more than half of the frozen sites, whatever is planted or cut?** It "
-        "hangs on how cold the ground is. These are few sites, each with one start and one weather, on which the plan "
-        "that keeps it is picked afterwards, for each site its own; one plan for all never keeps more:",
+        f"**By {last}, how much warming takes more than half of the frozen sites, whichever constant plan a site "
+        "gets?** It hangs on how cold the ground is. These are few sites, each with one start and one weather, on "
+        "which the plan that keeps it is picked afterwards, for each site its own; one plan for all never keeps more:",
         f"Frozen is ground that thaws less than {NEAR_SURFACE_M:.0f} m in each of ten years. In effect that is a deep "
         "node below 0 °C: where its mean passes 0 °C the modelled depth leaps by a metre or more. The ground's "
         f"temperature is that of the deep soil in {last}, without a scenario and without management. All are the same "
@@ -321,7 +321,8 @@ def drift(plans: pd.DataFrame, years: pd.DataFrame, today: str, first: str, last
         f"in {today}, {none.frozen_after_50.sum()} in {first}, {none.frozen_after_76.sum()} in {last}; the deep soil "
         f"changes by {cooler:+.2f} K from {first} to {last}, the median thaw depth of the {count} from {before:.2f} to "
         f"{after:.2f} m in all. A count of sites has it in it, so the table has the years; changes below are against "
-        f"the same years without a scenario. The figure's right half is of the {count} sites, each year by itself."
+        f"the same years without a scenario. The figure's right half is of the same {count} sites, frozen in that one "
+        "year, not in all of ten."
     )
 
 

@@ -93,8 +93,8 @@ def simulate_many(
     label : what the store says of the actions (None: the plan, or the policy's name and a hash of what it does). A
         store of another label is not gone on with.
     overwrite : start over, whatever `path` holds; what was killed goes on by the same command without it.
-    threads : of this process (None: one a core). address : "none", this process; "local", Ray on this machine; else of
-        a Ray cluster, see `sim.executor.each`.
+    threads : of this process (None: one a core).
+    address : "none", this process; "local", Ray on this machine; else of a Ray cluster, see `sim.executor.each`.
     progress : whether a line every ten seconds says how far it is.
     arguments : of `boreal_env.BorealEnv`, such as weather, boundary, soil_carbon, scenario, constants.
 

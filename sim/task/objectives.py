@@ -150,8 +150,9 @@ REWARD_COLUMNS = (
 def rewards_of_year(record: np.ndarray, actions: np.ndarray, reward: Reward, formulation: str) -> dict[str, np.ndarray]:
     """Both rewards of a year and the parts they are made of: `REWARD_COLUMNS`, each shape (n,).
 
-    record : annual records (n, columns of `sim.RECORD_NAMES`); actions : what was asked for, integers (n,);
-    formulation : of the thaw reward, one of `THAW_FORMULATIONS`.
+    record : annual records (n, columns of `sim.RECORD_NAMES`)
+    actions : what was asked for, integers (n,)
+    formulation : of the thaw reward, one of `THAW_FORMULATIONS`
     """
     components = reward_components(record, decode(actions)[0], reward)
     carbon = carbon_reward(components)
