@@ -65,7 +65,7 @@ class Args:
     repeats: int | None = None
     """repeats of every figure (7; 3 with --quick)"""
     output_dir: Path | None = None
-    """folder for benchmark.csv and benchmark.md (None: results, with --quick results/quick)"""
+    """folder for benchmark.csv (None: results, with --quick results/quick)"""
 
 
 # ------------------------------------------------------------------------------------------------ what is measured
@@ -396,20 +396,15 @@ def main(args: Args) -> None:
     unknown = [name for name in args.only if name not in SECTIONS]
     if unknown:
         protocol.fail(f"--only {unknown[0]}: allowed are {', '.join(SECTIONS)}")
-    if args.repeats is not None and args.repeats < 1:
-        protocol.fail(f"--repeats {args.repeats}: at least 1 is needed")
     folder = args.output_dir or results(args.quick)
     make_writable("--output-dir", folder)
     facts = machine()
     protocol.compile_physics(KERNELS)
     path = folder / "benchmark.csv"
     table = with_earlier(run(args), path)
-    text = markdown(facts, table)
     with protocol.replacing(path) as file:
         table.to_csv(file, index=False, float_format=protocol.FLOAT_FORMAT, lineterminator="\n")
-    with protocol.replacing(folder / "benchmark.md") as file:
-        file.write(text.encode())
-    print(text + f"\nwrote {folder}/benchmark.csv and .md")
+    print(markdown(facts, table) + f"\nwrote {path}")
 
 
 if __name__ == "__main__":

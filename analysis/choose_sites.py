@@ -72,9 +72,7 @@ def main(args: Args) -> None:
     """Choose and write."""
     if args.candidates < sum(NUMBERS.values()):
         protocol.fail(f"--candidates {args.candidates}: at least {sum(NUMBERS.values())}, as many as are chosen")
-    if args.path.is_dir():
-        protocol.fail(f"--path {args.path}: the name of a file is allowed")
-    paths.make_writable("--path", args.path.parent)
+    paths.make_file_writable("--path", args.path)
     seeds = sites.FIRST_EVALUATION_SEED + np.arange(args.candidates)
     table = pd.DataFrame({"seed": seeds, "site_seed": [site_seed_of(int(seed)) for seed in seeds]})
     values = pd.DataFrame([strata(sim.sample_site(seed)) for seed in table.site_seed])

@@ -303,7 +303,8 @@ def in_points(gained: pd.DataFrame, plans: np.ndarray) -> str:
 
 def sites_alone(results: Results) -> str:
     """Gains of agents of one objective on each of the single sites, and of the best constant plan there."""
-    columns, table = single_sites.COLUMNS, single_sites.make(results)
+    table = single_sites.make(results)
+    columns = {name: title for name, title in single_sites.COLUMNS.items() if name in table}
     if not has_numbers(table, columns):
         return not_run("main", "site")
     rows = table[list(columns)].to_numpy()
@@ -488,6 +489,7 @@ EXCERPTS = {
     "outside_speed": excerpts.outside_speed,
     "times": excerpts.times,
     "misses": excerpts.missing,
+    "changing_the_plan": excerpts.changing_the_plan,
     "knowing_the_site": excerpts.knowing_the_site,
     "looking_at_the_stand": excerpts.looking_at_the_stand,
     "gradient": excerpts.gradient,

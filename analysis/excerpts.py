@@ -3,6 +3,7 @@ scaling and maps, and of docs/validation.md, as Markdown."""
 
 import itertools
 import re
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy import stats
 
 from analysis import methods, paths, stored
 from analysis.studies import boreal_map as region_map
-from analysis.studies import replanning, site_choice, site_regression
+from analysis.studies import decade_plans, replanning, site_choice, site_regression
 from analysis.tables.common import markdown
 from analysis.validation import robustness_report
 from boreal_env import DEFAULT_YEARS
@@ -162,6 +163,23 @@ def boreal_map() -> str:
     return f"![What the policy plants, and what that does](images/boreal_map.png)\n\n{answer}\n"
 
 
+def changing_the_plan() -> str:
+    """What plans that change every ten years gain over constant ones, without looking."""
+    rows = []
+    for task in decade_plans.TASKS:
+        if not decade_plans.path(task).exists():
+            return f"Not run yet: `python {decade_plans.__name__.replace('.', '/')}.py`.\n"
+        for row in stored.read(decade_plans.path(task), text=("weight", "constant", "plan")).itertuples():
+            plans = [row.constant.split()[0], row.plan] if row.plan else ["", ""]
+            more = "0" if plans[1] == row.constant else f"{row.more:.2f} [{row.more_low:.2f}, {row.more_high:.2f}]"
+            if row.weight == decade_plans.ALL:
+                more = f"{row.plan_gain:.1f} [{100 + row.more_low:.1f}, {100 + row.more_high:.1f}] points of the score"
+            weight = row.weight if row.weight == decade_plans.ALL else f"{float(row.weight):g}"
+            rows.append([f"`{task}`", weight, *plans, more])
+    header = ["task", "carbon weight", "best constant plan", "found, by decade", "gain more than the constant plan's"]
+    return markdown(header, rows)
+
+
 def knowing_the_site() -> str:
     """What choosing a plan by site is worth; the two tables in results/studies have every weight."""
     for study in (site_choice, site_regression):
@@ -172,7 +190,7 @@ def knowing_the_site() -> str:
     rows = []
     for row in table[table.weight.astype(str) == site_choice.ALL].itertuples():
         scores = [
-            f"{getattr(row, way):.0f} [{getattr(row, f'{way}_low'):.0f}, {getattr(row, f'{way}_high'):.0f}]"
+            f"{getattr(row, way):.1f} [{getattr(row, f'{way}_low'):.1f}, {getattr(row, f'{way}_high'):.1f}]"
             for way in site_choice.WAYS[1:]
         ]
         by_parameters = fitted.loc[row.task]
@@ -182,7 +200,8 @@ def knowing_the_site() -> str:
         rows.append([f"`{row.task}`", "100", *scores, conifers_less_deciduous(thaw), *spread])
     header = ["task", "one plan for all sites", "the best of each site, on the dice that judge it"]
     header += [
-        "the best of each site, on other dice",
+        "on other dice",
+        "on all its dice",
         "by a regression on other sites",
         "conifers less deciduous, thaw",
         "its deviation between sites",
@@ -300,20 +319,25 @@ def misses(page: str) -> int:
     return sum(not row.startswith(f"| {robustness_report.SPAN} |") for row in rows)
 
 
+def of_judged(page: str) -> str:
+    """How many values miss of those that are judged, and how many of the others were calibrated."""
+    tables = "\n".join(line for line in page.split("What misses\n")[0].splitlines() if line.startswith("|"))
+    within = Counter(re.findall(r"(?:\| |\) )(in, calibrated|in)(?= \||, \d)", tables))
+    count = misses(page)
+    return f"{count} of {count + within.total()} judged values ({within['in, calibrated']} of the others calibrated)"
+
+
 def towers() -> str:
     """Both towers by month, and how many values of the whole page miss."""
     page = VALIDATION.read_text(encoding="utf-8")
     first, second = (scores(page, tower) for tower in TOWERS)
     header = ["monthly means", *(f"{tower}: {name.split()[-1]}" for tower in TOWERS for name in SCORES)]
     table = markdown(header, [[name, *first[name], *second[name]] for name in first])
-    miss = f"{misses(page)} entries of that page miss what was measured or published, and are listed at its end."
+    miss = f"{of_judged(page)} of that page miss what was measured or published, and are listed at its end."
     return f"{table}\n{miss}\n"
 
 
 def missing() -> str:
     """The README's line on what misses."""
-    count = misses(VALIDATION.read_text(encoding="utf-8"))
-    return (
-        f"- {count} entries of [docs/validation.md](docs/validation.md), listed at its end, miss what was measured or "
-        "published.\n"
-    )
+    count = of_judged(VALIDATION.read_text(encoding="utf-8"))
+    return f"- {count} of [docs/validation.md](docs/validation.md) miss what was measured or published.\n"

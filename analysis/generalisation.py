@@ -224,7 +224,7 @@ def judged(evaluations: Mapping[str, pd.DataFrame], plans: pd.DataFrame) -> pd.D
 
 def searched_plans(task: protocol.Task) -> pd.DataFrame | None:
     """What analysis/best_plans.py found in this physics; None if it has not been run, which is said."""
-    path = paths.studies() / "best_plans" / f"{task.env_id}.csv"
+    path = paths.there(paths.studies()) / "best_plans" / f"{task.env_id}.csv"
     if set(task.env_kwargs) - {"observation_groups"}:
         return None
     if not path.exists() or stored.settings(path)["physics"] != provenance.physics_name():
@@ -238,9 +238,7 @@ def main(args: Args) -> None:
     """Judge the runs on every split, print the summary, write the sites' ratios."""
     path = args.output
     if path is not None:
-        if path.is_dir():
-            sys.exit(f"error: --output {path}: the name of a file is allowed")
-        paths.make_writable("--output", path.parent)
+        paths.make_file_writable("--output", path)
     try:
         if args.episodes < 1:
             raise ValueError(f"--episodes {args.episodes}: 1 or more are allowed")

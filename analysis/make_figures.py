@@ -95,12 +95,12 @@ def main(args: Args) -> None:
     others = many_objectives.figures(results)
     for path in set(folder.glob(f"{many_objectives.STEM}_*.png")) - {folder / f"{name}.png" for name in others}:
         remove(path)
-    for name, (size, drawing) in others.items():
+    for name, (size, drawing, caption) in others.items():
         with matplotlib.rc_context(STYLE):
             figure = Figure(figsize=size, layout="constrained")
             drawing(figure)
             world = name.removeprefix(f"{many_objectives.STEM}_")
-            figure.supxlabel(textwrap.fill(f"{world}. {many_objectives.CAPTION}", int(18 * size[0])), fontsize=6)
+            figure.supxlabel(textwrap.fill(f"{world}. {caption}", int(18 * size[0])), fontsize=6)
             save(figure, folder / name)
     say_what_was_not_run("figures", not_run)
     number = len(FIGURES) - len(not_run) + len(others)

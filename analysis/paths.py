@@ -35,6 +35,13 @@ def there(folder: Path) -> Path:
     return folder if os.path.isdir(folder) or QUICK in folder.parts else REPOSITORY / folder
 
 
+def make_file_writable(flag: str, path: Path) -> None:
+    """The same of a file's folder; a flag that names a folder ends the script, too."""
+    if os.path.isdir(path):
+        fail(f"{flag} {path}: the name of a file is allowed")
+    make_writable(flag, path.parent)
+
+
 def make_writable(flag: str, folder: Path) -> None:
     """Make a folder before anything is computed; a flag's that cannot be written to ends the script with one line."""
     file = next((path for path in (folder, *folder.parents) if path.is_file()), None)

@@ -122,10 +122,10 @@ def main(args: Args) -> None:
         )
     if args.quick:
         args.stands = 12
+    path = paths.results(args.quick) / "region_killed.csv"
+    paths.make_writable("results", path.parent)
     with tempfile.TemporaryDirectory() as folder:
         table = run(args, Path(folder))
-    path = paths.results(args.quick) / "region_killed.csv"
-    path.parent.mkdir(parents=True, exist_ok=True)
     with protocol.replacing(path) as file:
         table.to_csv(file, index=False, lineterminator="\n")
     print(table.to_string(index=False))

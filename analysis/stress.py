@@ -469,7 +469,7 @@ def write(folder: Path, name: str, table: pd.DataFrame) -> None:
 
 def main(args: Args) -> None:
     """Run the batches, print and write what they have shown; exits with 1 if anything failed."""
-    for name, low in (("stand_years", 1), ("seed", 0), ("threads", 1), ("batch", 0)):
+    for name, low in (("stand_years", 1), ("batch", 0)):
         value = getattr(args, name)
         if value is not None and value < low:
             protocol.fail(f"--{name.replace('_', '-')} {value}: an integer from {low} on is allowed")

@@ -175,7 +175,7 @@ def all_runs(args: Args) -> list[Run]:
         command = commands.Command(
             (str(args.script.resolve()), *words, "--run-dir", str(folder)), log, getattr(one, "total_timesteps", 0)
         )
-        lanes = {lanes_for(one.num_envs, 1), LANES} if task.boreal else set()
+        lanes = {lanes_for(getattr(one, "num_envs", 1), 1), LANES} if task.boreal else set()
         found.append(Run(settings, seed, folder, command, lanes, {"script": args.script.stem, **arguments_there(one)}))
     if len({run.folder for run in found}) < len(found):
         protocol.fail("--grid: two of its combinations are the same run")
@@ -235,9 +235,7 @@ def main(args: Args) -> None:
     """Run what is not finished, and make the table when all is."""
     found = all_runs(args)
     mine = part_of(found, args.part)
-    if args.output.is_dir():
-        protocol.fail(f"--output {args.output}: the name of a file is allowed")
-    paths.make_writable("--output", args.output.parent)
+    paths.make_file_writable("--output", args.output)
     paths.make_writable("--runs-dir", args.runs_dir)
     try:
         check_address(args.address)

@@ -10,10 +10,11 @@ from sim import stands
 # Files that train, run a study or a script's process, or need every kernel; `pytest -m quick` leaves them out. Single
 # tests that take long for what they add have `@pytest.mark.slow`; `pytest` leaves them out, `pytest -m ""` does not.
 SLOW = """agents archive arithmetic backends benchmark best_plans boreal_map claims command_line commands course cuda
-docs document_results ensembles eupg executor explore field_experiments flags fronts heuristics imports make_figures
-make_tables measure_balance mechanisms moea new_method outside picture plan_regression ppo_curriculum ppo_gated
-ppo_group protocol region_killed replanning resume scaling sensitivity signal_to_noise simulator_page soil_column
-stand_development stress sweep task three_objectives utility validate variance warming workers"""
+decade_plans docs document_results ensembles eupg executor explore field_experiments flags fronts heuristics imports
+make_figures make_tables measure_balance mechanisms moea new_method objective_scales outside picture plan_regression
+ppo_curriculum ppo_gated ppo_group protocol region_killed replanning resume scaling sensitivity signal_to_noise
+simulator_page site_choice soil_column stand_development stress sweep task three_objectives utility validate variance
+warming workers"""
 
 
 def pytest_collection_modifyitems(items):

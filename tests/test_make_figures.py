@@ -180,12 +180,6 @@ def test_marks_lie_within_their_axis():
     assert learning_difficulty.around(np.array([50.0]), 2.0, 100.0) == (2.0, 100.0)
 
 
-def test_without_runs_it_names_a_command(tmp_path):
-    with pytest.raises(SystemExit, match="python baselines_heuristic/zero_change.py"):
-        make_figures.main(make_figures.Args(runs_dir=(tmp_path,), figures_dir=tmp_path / "figures"))
-    assert not (tmp_path / "figures").exists()
-
-
 def test_an_empty_panel_shows_its_command():
     ax = Figure().subplots()
     no_data(ax, "python a.py --seed 1")

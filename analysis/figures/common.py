@@ -26,8 +26,6 @@ STYLE = {
     "axes.spines.right": False,
     "legend.frameon": False,
     "lines.linewidth": 1.3,
-    "axes.unicode_minus": True,
-    "svg.hashsalt": "borearl",
     "pdf.fonttype": 42,
 }
 WEIGHT_COLOURS = "viridis"
@@ -104,7 +102,7 @@ def finish(ax, **labels) -> None:
     ax.set(**labels)
     for axis, most in ((ax.xaxis, 4), (ax.yaxis, 5)):
         if isinstance(axis.get_major_formatter(), ScalarFormatter):
-            axis.set_major_locator(MaxNLocator(most))
+            axis.set_major_locator(MaxNLocator(most, steps=(1, 2, 5, 10)))
             axis.get_major_formatter().set_useOffset(False)
     if wanted:
         experiments = " ".join(dict.fromkeys(job.experiment for job in wanted))

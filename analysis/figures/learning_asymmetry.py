@@ -20,8 +20,8 @@ SIZE = (7.2, 5.0)
 MADE_BY = "python analysis/reproduce.py --only fixed site"
 CAPTION = (
     "Fixed λ EUPG, one agent a weight; sums over 50 years. (c) Greedy, over doing nothing, on validation sites; "
-    f"{SEEDS_95}; (b, f) of boreal-site-specific-v0, over sites. (f) agents of one objective alone, its gain in "
-    "training; dashed: with --baseline others."
+    f"{SEEDS_95}, of five; (b, f) of boreal-site-specific-v0, over five sites instead of seeds. (f) agents of one "
+    "objective alone, its gain in training; dashed: with --baseline others."
 )
 GAIN = "scalarized_gain"
 PANELS = {  # experiment, column of the training episodes, label, title

@@ -4,6 +4,7 @@ Parallel coordinates have an axis an objective and a line a weight. With three o
 each return besides: a corner is all weight on one objective, a point a weight of the lattice.
 """
 
+import itertools
 import textwrap
 
 import numpy as np
@@ -19,15 +20,16 @@ EQUAL, REFERENCE = "#999999", "black"
 CAPTION = (
     "Evaluation, greedy: mean returns over episodes and training seeds (one seed: its own) at each weight. A line has "
     "the colour of the largest weight's objective, grey where several share it; widths only keep lines "
-    "apart. Triangles, of three objectives: a corner is all weight on one, the colour is the return."
+    "apart."
 )
 
+OF_TRIANGLES = " Triangles: a corner is all weight on one, the colour is the return."
 STEM = "many_objectives"
 MADE_BY = "python analysis/reproduce.py --only worlds"
 
 
 def figures(results) -> dict:
-    """File name -> function that draws it into a figure, and its size in inches."""
+    """File name -> its size in inches, the function that draws it into a figure, and its caption."""
     found = {}
     for env_id in dict.fromkeys(key[1] for key in results.rows):
         objectives = results.objectives(env_id)
@@ -37,7 +39,8 @@ def figures(results) -> dict:
             fixed = {key: one for key, one in rows.items() if key not in followers}
             columns = 4 if len(objectives) == 3 else 1
             size = (2.8 + 1.9 * (columns - 1) if columns > 1 else 5.0, 0.7 + 2.1 * len(followers))
-            found[f"{STEM}_{file_stem(env_id)}"] = (size, drawn(objectives, followers, fixed))
+            caption = CAPTION + (OF_TRIANGLES if columns > 1 else "")
+            found[f"{STEM}_{file_stem(env_id)}"] = (size, drawn(objectives, followers, fixed), caption)
     return found
 
 
@@ -59,7 +62,8 @@ def drawn(objectives, followers, fixed):
                 triangle = ternary_diagram(ax, table, objectives, k, (low[k], high[k]))
                 figure.colorbar(triangle, ax=ax, shrink=0.7, label=f"{objectives[k]} return")
         names = [*objectives, "shared", *(["fixed strategy, which does not look at the weight"] if references else [])]
-        looks = [(colour, "-") for colour in COLOURS[: len(objectives)]] + [(EQUAL, "-"), (REFERENCE, "--")]
+        colours = itertools.islice(itertools.cycle(COLOURS), len(objectives))
+        looks = [(colour, "-") for colour in colours] + [(EQUAL, "-"), (REFERENCE, "--")]
         handles = [Line2D([], [], color=colour, linestyle=style) for colour, style in looks[: len(names)]]
         figure.legend(handles, names, loc="outside upper center", ncols=3)
 

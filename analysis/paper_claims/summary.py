@@ -90,11 +90,13 @@ SENTENCES = (
     ),
     Sentence(
         mechanisms.stems,
-        "thaw return without interception",
+        mechanisms.WITHOUT_SNOW,
         "Stems store carbon, help permafrost by the snow that they catch and harm it by what they absorb",
         "The paper says that dense stands store carbon, help permafrost by the snow that they catch (its table says "
         "the opposite) and can harm it by what they absorb; not all of it holds here",
-        "Stems and permafrost: part of what the paper says is open",
+        "That dense stands store carbon and help permafrost by the snow that they catch, as the paper's introduction "
+        "says (its table says the opposite), holds; whether the rest of what they do harms it hangs on the wind",
+        beside=mechanisms.IN_WEAK_WIND,
     ),
     Sentence(
         paper_itself.heuristic_hypervolumes,
@@ -121,7 +123,8 @@ def counted(verdicts: Counter, reached: list[float]) -> str:
         f"We read {verdicts.total()} facts in the paper on what comes out ahead or which way a mechanism works. Here "
         f"{verdicts[HOLDS]} hold, {verdicts[FAILS]} do not, and {open_} are open or cannot be tested. Of the "
         f"{verdicts[FAILS]} that do not, {numbers} fail since our numbers say otherwise, and {small} since what is "
-        f"left of the effect is too small: less than a quarter of what [its rule](#how-it-is-judged) measures it by. "
+        f"left of the effect is too small: less than a quarter (of a ratio of spreads a tenth) of what [its "
+        f"rule](#how-it-is-judged) measures it by. "
         f"If a tenth counted, {open_by_less} of these {small} would be open."
     )
 

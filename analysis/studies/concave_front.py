@@ -4,8 +4,8 @@
 
 Every constant plan is played on one of the test sites, under its fixed weather. Of those that no other plan
 dominates some lie below the line between two others: at no preference a weighted sum takes them, Chebyshev's utility
-does. Writes results/studies/concave_front.csv (mean gains over doing nothing, and at how many of 101 preferences a plan
-is the best one) and docs/images/concave_front.png.
+does. Prints mean gains over doing nothing, and at how many of 101 preferences a plan is the best one; draws
+docs/images/concave_front.png.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis import paths, stored
+from analysis import paths
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts, reference
 from cleanrl_style.protocol.arguments import ask, ideal_point
@@ -104,13 +104,10 @@ def main(args: Args) -> None:
         protocol.fail(f"--env-id {args.env_id}: an environment of two objectives is allowed")
     front, choices = study(task, protocol.evaluation_seeds(task, 1))
     print(front.to_string(index=False, float_format="%.3f"))
-    path = paths.studies() / "concave_front.csv"
-    made_by = {"env_id": args.env_id, "site_seed": args.site_seed}
-    stored.write(path, front, made_by)
     with protocol.replacing(args.path) as file:
         title = f"{args.env_id}, site {args.site_seed}: constant plans"
         draw(front, choices, title).savefig(file, format="png", dpi=110)
-    print(f"wrote {path} and {args.path}")
+    print(f"wrote {args.path}")
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ PAIRS = {
         ({"fall_start_day": lambda day: day - 10}, {}, boreal_env.NO_CHANGE),
         ({"fall_start_day": lambda day: day + 10}, {}, boreal_env.NO_CHANGE),
     ),
-    "conifers 0.2 to 0.8 of the stems, on one organic layer": (
+    "conifers 0.2 to 0.8 of the stems, on one first organic layer": (
         ({}, {"conifer_fraction": 0.2, "organic_layer_m": 0.1}, boreal_env.NO_CHANGE),
         ({}, {"conifer_fraction": 0.8, "organic_layer_m": 0.1}, boreal_env.NO_CHANGE),
     ),

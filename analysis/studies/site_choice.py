@@ -1,12 +1,14 @@
 """How much a plan that is chosen for a site gains over one for all sites, and how much of that is luck of the dice.
 
-    python analysis/studies/site_choice.py      # three minutes on two idle cores
+    python analysis/studies/site_choice.py      # half an hour on two idle cores
 
-The constant plans that are best anywhere are played on sampled sites, each with one first stand under several weathers
-and dice of its own, the same for all plans. Three ways to choose: one plan for all sites; for each site the best one on
-the very dice that it is judged on, which no agent can know; and for each site the best one on all other dice, a little
-less than what an agent could that knew the site to perfection. Leaves results/studies/site_choice.csv, a row a task and
-weight, and weight "all", in which gains are scores: 100 is one plan for all sites, its own for each weight.
+The constant plans that are best anywhere, and the plans by decade that `decade_plans.py` found, are played on sampled
+sites, each with one first stand under several weathers and dice of its own, the same for all plans. Four ways to
+choose: one constant plan for all sites; for each site and die the best plan on that very die, which no agent can know;
+and for each site the plan that is best on average on the other dice, or on all. The last two have between them what an
+agent gains that knows the site to perfection: on other dice it takes a lesser plan now and then, on all it counts some
+luck as skill. Leaves results/studies/site_choice.csv, a row a task and weight, and weight "all", in which gains are
+scores: 100 is one plan for all sites, its own for each weight.
 """
 
 from collections.abc import Sequence
@@ -24,12 +26,14 @@ from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 
 YEARS = 50
-SITES, DICE = 64, 8
-CHUNK = 128  # episodes in lockstep
+SITES, DICE = 256, 16
+CHUNK = 512  # episodes in lockstep
 REPETITIONS = 1000  # of the bootstrap over sites
 PLANS = (boreal_env.NO_CHANGE, 20, 21, 22, 23, 24)  # nothing, and 100 stems a year of 0 to 100 % conifers
+#: Conifers first, deciduous trees later, an action for each ten years: what `decade_plans.py` found.
+CHANGING = ((24, 24, 20, 20, 20), (24, 24, 21, 20, 20), (24, 21, 20, 20, 20))
 ALL = "all"
-WAYS = ("all_sites", "same_dice", "other_dice")
+WAYS = ("all_sites", "same_dice", "other_dice", "all_dice")
 #: Task -> the simulator's arguments and the scale of its carbon reward.
 TASKS = {
     "boreal-generalist-v0": ({}, boreal_env.Reward().carbon_scale),
@@ -49,13 +53,14 @@ class Args:
     """2 sites, 2 dice, 3 years: to see that it runs, into results/quick/studies"""
 
 
-def play(task: str, dice_of_site: dict[int, Sequence[int]], years: int, progress) -> np.ndarray:
-    """Gains over doing nothing of every plan, (plans, sites, dice, 2).
+def play(task: str, dice_of_site: dict[int, Sequence[int]], plans: np.ndarray, progress) -> np.ndarray:
+    """Returns of every plan, (plans, sites, dice, 2).
 
-    dice_of_site : number of a site -> numbers of its dice, as many for each.
+    dice_of_site : number of a site -> numbers of its dice, as many for each; plans : an action a year, (plans, years);
+    progress : called after every `CHUNK` episodes.
     """
     arguments, carbon_scale = TASKS[task]
-    design = [(site, die, plan) for site, dice in dice_of_site.items() for die in dice for plan in PLANS]
+    design = [(site, die, plan) for site, dice in dice_of_site.items() for die in dice for plan in plans]
     returns = []
     for first in range(0, len(design), CHUNK):
         part = design[first : first + CHUNK]
@@ -63,28 +68,28 @@ def play(task: str, dice_of_site: dict[int, Sequence[int]], years: int, progress
         episodes = open_loop.play(
             [sim.sample_site(number) for number in numbers],
             [open_loop.seeds(number, die) for number, (_, die, _) in zip(numbers, part, strict=True)],
-            np.repeat([[plan] for *_, plan in part], years, axis=1),
+            np.array([plan for *_, plan in part]),
             **arguments,
         )
         reward = boreal_env.Reward(carbon_scale=carbon_scale)
         rewards = (
             open_loop.rewards_of_year(episodes.record[:, year], episodes.actions[:, year], reward)
-            for year in range(years)
+            for year in range(plans.shape[1])
         )
         returns.append(sum(rewards))
         progress()
-    table = np.concatenate(returns).reshape(len(dice_of_site), -1, len(PLANS), 2).transpose(2, 0, 1, 3)
-    return table - table[:1]
+    return np.concatenate(returns).reshape(len(dice_of_site), -1, len(plans), 2).transpose(2, 0, 1, 3)
 
 
 def chosen_gains(gains: np.ndarray, weight: float) -> np.ndarray:
-    """Scalarised gain of each site by each of WAYS, (3, sites); gains (plans, sites, dice, 2)."""
+    """Scalarised gain of each site by each of WAYS, (4, sites); gains (plans, sites, dice, 2), of PLANS first."""
     scalarised = weight * gains[..., 0] + (1 - weight) * gains[..., 1]
     dice = scalarised.shape[2]
     others = (scalarised.sum(axis=2, keepdims=True) - scalarised) / (dice - 1)
     by_others = np.take_along_axis(scalarised, others.argmax(axis=0)[None], axis=0)[0]
-    best = scalarised.mean(axis=(1, 2)).argmax()
-    return np.stack([scalarised[best].mean(axis=1), scalarised.max(axis=0).mean(axis=1), by_others.mean(axis=1)])
+    of_plans = scalarised.mean(axis=2)
+    for_all = of_plans[of_plans[: len(PLANS)].mean(axis=1).argmax()]
+    return np.stack([for_all, scalarised.max(axis=0).mean(axis=1), by_others.mean(axis=1), of_plans.max(axis=0)])
 
 
 def summarise(task: str, gains: np.ndarray) -> list[dict]:
@@ -125,10 +130,14 @@ def main(args: Args) -> None:
     if stored.is_finished(path(args.quick), made_by):
         print(f"{path(args.quick)} is finished")
         return
-    chunks = -(-sites * dice * len(PLANS) // CHUNK) * len(TASKS)
+    plans = np.repeat([*([plan] * 5 for plan in PLANS), *CHANGING], YEARS // 5, axis=1)[:, :years]
+    chunks = -(-sites * dice * len(plans) // CHUNK) * len(TASKS)
     progress = protocol.Progress("site_choice", chunks, "chunks")
     every = {site: range(site * dice, (site + 1) * dice) for site in range(sites)}
-    rows = [row for task in TASKS for row in summarise(task, play(task, every, years, progress.add))]
+    rows = []
+    for task in TASKS:
+        returns = play(task, every, plans, progress.add)
+        rows += summarise(task, returns - returns[:1])
     table = pd.DataFrame(rows)
     stored.write(path(args.quick), table, made_by)
     print(table[["task", "weight", *WAYS]].round(2).to_string(index=False) + f"\nwrote {path(args.quick)}")

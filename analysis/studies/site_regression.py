@@ -92,19 +92,20 @@ def main(args: Args) -> None:
     sites, years = (16, 2) if args.quick else (args.sites, site_choice.YEARS)
     if sites < 2 * FOLDS:
         protocol.fail(f"--sites {sites}: {2 * FOLDS} or more are allowed")
-    made_by = {"sites": sites, "years": years}
+    made_by = {"first_site": site_choice.SITES, "sites": sites, "years": years}
     if stored.is_finished(path(args.quick), made_by):
         print(f"{path(args.quick)} is finished")
         return
     others = site_choice.SITES * site_choice.DICE  # dice that site_choice.py has
     dice = {site: [others + site] for site in range(site_choice.SITES, site_choice.SITES + sites)}
     parameters = [list(sim.sample_site(open_loop.FIRST_SITE_SEED + site).values()) for site in dice]
-    chunks = -(-sites * len(site_choice.PLANS) // site_choice.CHUNK) * len(site_choice.TASKS)
+    plans = np.repeat(np.array(site_choice.PLANS)[:, None], years, axis=1)
+    chunks = -(-sites * len(plans) // site_choice.CHUNK) * len(site_choice.TASKS)
     progress = protocol.Progress("site_regression", chunks, "chunks")
     rows = []
     for task in site_choice.TASKS:
-        gains = site_choice.play(task, dice, years, progress.add)[:, :, 0]
-        rows += summarise(task, np.array(parameters), gains)
+        returns = site_choice.play(task, dice, plans, progress.add)[:, :, 0]
+        rows += summarise(task, np.array(parameters), returns - returns[:1])
     table = pd.DataFrame(rows)
     stored.write(path(args.quick), table, made_by)
     print(table.round(2).to_string(index=False) + f"\nwrote {path(args.quick)}")

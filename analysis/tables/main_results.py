@@ -46,17 +46,7 @@ COLUMNS = ROW_COLUMNS | {
     "carbon_slope": "slope of carbon",
     "thaw_slope": "slope of thaw",
 }
-TERMINAL = (
-    "method",
-    "environment",
-    "setting",
-    "seeds",
-    "score, greedy",
-    "score, sampled",
-    "gain",
-    "seeds to tell 0.1",
-    "gain hypervolume",
-)
+TERMINAL = tuple(COLUMNS.values())[:9]
 
 
 def front_metrics(evaluation: pd.DataFrame, prefix: str = "", reference: float = metrics.REFERENCE_POINT) -> dict:

@@ -48,8 +48,8 @@ def detailed_table(rows: dict, objectives) -> tuple[pd.DataFrame, dict]:
 
 
 def file_stem(env_id: str) -> str:
-    """An environment's id as part of a file's name."""
-    return env_id.split(":")[-1].replace("/", "-")
+    """An environment's id as part of a file's name, without what ends one."""
+    return env_id.split(":")[-1].replace("/", "-").replace(".", "-")
 
 
 def make(results) -> dict[str, tuple[pd.DataFrame, dict]]:

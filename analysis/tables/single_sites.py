@@ -6,6 +6,7 @@ Gains are of 50-year returns over zero change in the evaluation, in the objectiv
 import numpy as np
 import pandas as pd
 
+import boreal_env
 from analysis.studies import constant_plans
 
 MADE_BY = "python analysis/reproduce.py --only main site"
@@ -17,6 +18,7 @@ COLUMNS = {
     "thaw_baseline": "baseline (others)",
     "thaw_total": "utility (total)",
     "thaw_plan": "best constant plan",
+    "thaw_unchanged": "thaw return of doing nothing",
     "carbon_eupg": "carbon gain, EUPG",
     "carbon_baseline": "baseline (others)",
     "carbon_plan": "best constant plan",
@@ -38,6 +40,8 @@ def make(results) -> pd.DataFrame:
         for variant, flags in VARIANTS.items():
             columns[f"{name}_{variant}"] = own_gains(results.of("site", "eupg_fixed_lambda", **flags), weight)
         columns[f"{name}_plan"] = constant_plans.best_gains(plans, f"{name}_return") if plans is not None else np.nan
+    if plans is not None:
+        columns["thaw_unchanged"] = plans[plans.action == boreal_env.NO_CHANGE].set_index("site_seed").thaw_return
     table = pd.DataFrame(
         columns,
         index=sorted(set().union(*(column.index for column in columns.values() if isinstance(column, pd.Series)))),

@@ -3,7 +3,8 @@
 import numpy as np
 
 import sim
-from analysis.validation.held_stands import NO_CHANGE, UNDISTURBED
+from analysis.validation.held_stands import UNDISTURBED
+from boreal_env import NO_CHANGE
 from sim.spin_up import BOUNDARY
 from sim.stands import HELD_COLUMNS
 from sim.state import PARAMETER_NAMES

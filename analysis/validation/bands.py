@@ -176,5 +176,5 @@ def draw(values: dict[str, dict[str, np.ndarray]]) -> bytes:
         ax.invert_yaxis()
         ax.set_title(name)
         ax.set_xlabel("" if check.unit == "1" else check.unit)
-    figure.suptitle("Held stands on sampled sites: median and 10-90 % of sites, and the band of observations (grey)")
+    figure.suptitle("Held stands on sampled sites: median and 10-90 % of sites, and the band of the table (grey)")
     return document.png(figure)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import sim
-from analysis.validation.held_stands import NO_CHANGE, UNDISTURBED
+from analysis.validation.held_stands import UNDISTURBED
+from boreal_env import NO_CHANGE
 from sim.stands import HELD_COLUMNS
 from sim.state import DAILY_NAMES, STATE, STATE_NAMES
 

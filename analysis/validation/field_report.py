@@ -57,7 +57,8 @@ n-factors and open ground have no verdict. Air is above the canopy.
 
 {document.table(header, floor_rows, left=6)}
 
-Mature spruce on {DEEP_MOSS["organic_layer_m"]:g} m of organic layer, the climate and permafrost of US-Prr.
+Mature spruce on {DEEP_MOSS["organic_layer_m"]:g} m of organic layer, the climate and permafrost of US-Prr. Where thaw
+is metres deep the permafrost is being lost.
 
 {document.table(header, thaw_rows, left=6)}"""
     return Part(text, misses=[*misses, *floor_misses, *thaw_misses])

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import sim
-from analysis.validation.held_stands import NO_CHANGE, Run
-from boreal_env import BALANCED_WORLD
+from analysis.validation.held_stands import Run
+from boreal_env import BALANCED_WORLD, NO_CHANGE
 from sim.demography import AGES, stem_weight
 from sim.jit import uncompiled
 from sim.state import PARAMETER_NAMES, STATE

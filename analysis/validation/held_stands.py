@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 
 import sim
+from boreal_env import NO_CHANGE
 from sim.stands import HELD_COLUMNS
 from sim.state import DAILY_NAMES, DAYS
 
 UNDISTURBED = {"fire": False, "insects": False}
-NO_CHANGE = 10  # action 5 * 2 + 0: density index 2 leaves the stand alone
 MONTH = pd.date_range("2001-01-01", periods=DAYS).month.to_numpy()  # of each day of a year without leap day
 
 #: Kind -> first stocks. 1500 stems/ha of one age class are a closed stand. Biomass: interior Alaska, conifers 5.6 (mean

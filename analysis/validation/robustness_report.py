@@ -182,6 +182,6 @@ def _of_world(default: pd.Series, levels: pd.DataFrame) -> str:
     inert = int(alike.groupby(levels.constant).all().sum())
     return (
         f"zero change returns {number(default.zero_change, 2, sign=True)}, and planting adds {' and '.join(added)}. "
-        f"Constants that turn the sign of the effect: {turned['conifers']} of conifers, {turned['deciduous']} of "
+        f"Constants that turn the sign of this mean: {turned['conifers']} of conifers, {turned['deciduous']} of "
         f"deciduous trees; {inert} change nothing there, so that nothing is said of them."
     )

@@ -14,9 +14,9 @@ import pandas as pd
 import sim
 from analysis.validation import document
 from analysis.validation.document import Miss, number
-from analysis.validation.held_stands import NO_CHANGE
 from analysis.validation.scores import Skill, skill
 from analysis.validation.tower_stands import TowerStand
+from boreal_env import NO_CHANGE
 from sim.physical_constants import MJ_PER_DAY
 
 MEASURED_SHARE = 0.5

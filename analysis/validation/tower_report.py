@@ -167,6 +167,7 @@ def _svartberget_text(comparison: Comparison) -> tuple[str, list[Miss]]:
     heat = comparison.fluxes["ground_heat_w_m2"]
     taken = heat.sum() * MJ_PER_DAY
     counts = comparison.fluxes["soil_temperature_c_measured"] >= tower_comparison.MEASURED_SHARE
+    filled_from = counts[counts].index[-1] + pd.Timedelta(days=1)
     text = f"""### SE-Svb, Svartberget, 2019
 
 Pine and spruce in northern Sweden, 64.3 N, no permafrost; half-hourly weather. The trees' leaf area is
@@ -178,7 +179,7 @@ average. A model that closes has to exceed the latent or the sensible heat. LE/(
 depend on that: measured {number(measured)}, modelled {number(modelled)}.
 
 **Ground.** Soil was measured at 5 cm; the model's is the top of the mineral soil. From
-{counts[counts].index[-1] + pd.Timedelta(days=1):%-d %B} on its record is filled with one value and not compared; that
+{filled_from.day} {filled_from:%B} on its record is filled with one value and not compared; that
 of ground heat ends there, too, after having taken up {number(taken, 0)} MJ m⁻² on its {heat.notna().sum()} whole days.
 
 **Carbon.** What was measured is net exchange. The record's respiration doubles from 4 to 16 August, with the soil 2 K

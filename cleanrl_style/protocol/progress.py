@@ -38,10 +38,10 @@ class Progress:
             return
         self.shown = now
         rate = (done - self.done_before) / (now - self.start)
-        afterwards = self.then(rate)
+        left, afterwards = (self.total - done) / max(rate, 1e-9), self.then(rate)
         line = (
             f"{self.label} {done:,}/{self.total:,} {self.unit}, {rate:,.0f}/s, "
-            f"{((self.total - done) / rate + afterwards) / 60:.1f} min left{' with evaluation' if afterwards else ''}"
+            f"{(left + afterwards) / 60:.1f} min left{' with evaluation' if afterwards else ''}"
         )
         if self.note:
             line += f", {self.note}"

@@ -145,9 +145,9 @@ def is_plain(value) -> bool:
         return all(map(is_plain, value.values()))
     if isinstance(value, (tuple, list)):
         return all(map(is_plain, value))
-    return (
-        value is None or isinstance(value, (bool, int, float)) or (isinstance(value, str) and not Path(value).is_file())
-    )
+    if isinstance(value, str):
+        return not os.path.isfile(value)
+    return value is None or isinstance(value, (bool, int, float))
 
 
 def measure(task: Task, seeds: list[int]) -> pd.DataFrame:

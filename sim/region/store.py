@@ -240,7 +240,7 @@ def in_words(value) -> str:
 
 
 def _in_words(value) -> str:
-    if isinstance(value, (str, Path)) and Path(value).is_file():
+    if isinstance(value, (str, Path)) and os.path.isfile(value):  # False, too, of text longer than names may be
         return f"{value} {hashlib.sha256(Path(value).read_bytes()).hexdigest()[:16]}"
     if isinstance(value, np.ndarray):
         value = value.tolist()
