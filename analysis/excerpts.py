@@ -173,7 +173,7 @@ def changing_the_plan() -> str:
             plans = [row.constant.split()[0], row.plan] if row.plan else ["", ""]
             more = "0" if plans[1] == row.constant else f"{row.more:.2f} [{row.more_low:.2f}, {row.more_high:.2f}]"
             if row.weight == decade_plans.ALL:
-                more = f"{row.plan_gain:.1f} [{100 + row.more_low:.1f}, {100 + row.more_high:.1f}] points of the score"
+                more = f"score {row.plan_gain:.1f} [{100 + row.more_low:.1f}, {100 + row.more_high:.1f}]"
             weight = row.weight if row.weight == decade_plans.ALL else f"{float(row.weight):g}"
             rows.append([f"`{task}`", weight, *plans, more])
     header = ["task", "carbon weight", "best constant plan", "found, by decade", "gain more than the constant plan's"]
@@ -206,7 +206,10 @@ def knowing_the_site() -> str:
         "conifers less deciduous, thaw",
         "its deviation between sites",
     ]
-    return markdown([*header, "between dice of a site"], rows)
+    made, others = (stored.settings(study.path())["sites"] for study in (site_choice, site_regression))
+    design = f"{made} sites, weathers and dice on each: {stored.settings(site_choice.path())['dice']}"
+    table = markdown([*header, "between dice of a site"], rows)
+    return f"{table}\n{design}; of the regression {others} other sites, one each.\n"
 
 
 def looking_at_the_stand() -> str:
