@@ -193,8 +193,10 @@ def knowing_the_site() -> str:
             f"{getattr(row, way):.1f} [{getattr(row, f'{way}_low'):.1f}, {getattr(row, f'{way}_high'):.1f}]"
             for way in site_choice.WAYS[1:]
         ]
-        by_parameters = fitted.loc[row.task]
-        scores.append(f"{by_parameters.score:.1f} [{by_parameters.score_low:.1f}, {by_parameters.score_high:.1f}]")
+        scores += [
+            "{:.1f} [{:.1f}, {:.1f}]".format(*(fitted.loc[row.task, f"{name}{part}"] for part in ("", "_low", "_high")))
+            for name in ("score", "score_constant")
+        ]
         thaw = table[(table.task == row.task) & (table.weight.astype(str) == "0.0")].iloc[0]
         spread = [f"{thaw[name]:.2f}" for name in ("sd_sites", "sd_dice")]
         rows.append([f"`{row.task}`", "100", *scores, conifers_less_deciduous(thaw), *spread])
@@ -203,6 +205,7 @@ def knowing_the_site() -> str:
         "on other dice",
         "on all its dice",
         "by a regression on other sites",
+        "of constant plans alone",
         "conifers less deciduous, thaw",
         "its deviation between sites",
     ]

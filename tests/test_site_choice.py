@@ -46,6 +46,16 @@ def test_regression_finds_a_plan_that_a_parameter_decides_and_no_other():
     assert rows[1.0]["score"] == pytest.approx(to_be_had, rel=0.02)
     assert rows[0.0]["score"] == pytest.approx(100, abs=5)  # luck is not to be foreseen
     assert rows[1.0]["score_low"] < rows[1.0]["score"] < rows[1.0]["score_high"]
+    assert rows[1.0]["score_constant"] == rows[1.0]["score"]  # all plans are constant
+
+
+def test_plans_that_change_are_chosen_beside_the_constant_ones_and_the_score_is_of_those():
+    rng = np.random.default_rng(1)
+    parameters = rng.normal(size=(64, 2))
+    gains = np.ones((len(site_choice.PLANS) + len(site_choice.CHANGING), 64, 2))
+    gains[-1] = 2.0
+    for row in site_regression.summarise("task", parameters, gains):
+        assert (row["score"], row["score_constant"]) == (pytest.approx(200), pytest.approx(100))
 
 
 @pytest.mark.slow

@@ -53,6 +53,11 @@ class Args:
     """2 sites, 2 dice, 3 years: to see that it runs, into results/quick/studies"""
 
 
+def all_plans(years: int) -> np.ndarray:
+    """Actions of PLANS, then of CHANGING, (plans, years)."""
+    return np.repeat([*([plan] * 5 for plan in PLANS), *CHANGING], YEARS // 5, axis=1)[:, :years]
+
+
 def play(task: str, dice_of_site: dict[int, Sequence[int]], plans: np.ndarray, progress) -> np.ndarray:
     """Returns of every plan, (plans, sites, dice, 2).
 
@@ -130,7 +135,7 @@ def main(args: Args) -> None:
     if stored.is_finished(path(args.quick), made_by):
         print(f"{path(args.quick)} is finished")
         return
-    plans = np.repeat([*([plan] * 5 for plan in PLANS), *CHANGING], YEARS // 5, axis=1)[:, :years]
+    plans = all_plans(years)
     chunks = -(-sites * dice * len(plans) // CHUNK) * len(TASKS)
     progress = protocol.Progress("site_choice", chunks, "chunks")
     every = {site: range(site * dice, (site + 1) * dice) for site in range(sites)}

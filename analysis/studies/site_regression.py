@@ -1,13 +1,13 @@
 """What a plan gains that is chosen for a site by its parameters, as a regression over many sites knows them.
 
-    python analysis/studies/site_regression.py      # nine minutes on two idle cores
+    python analysis/studies/site_regression.py      # a quarter of an hour on two idle cores
 
 `site_choice.py` asks what there is to gain by knowing a site; this study, how much of it the site's parameters tell one
-who has tried every plan on hundreds of sites. The constant plans that are best anywhere are played on other sampled
-sites, one episode each, with weather and dice of the site's own, the same for all plans (of dice that all sites share a
-regression would learn the luck). A ridge regression from the parameters to each plan's gain is fitted on seven eighths
-of the sites and chooses for the last, in turn. Leaves results/studies/site_regression.csv, a row a task and weight, and
-weight "all": scores, where 100 is one plan for all sites, its own for each weight.
+who has tried its plans on thousands of sites. They are played on other sampled sites, one episode each, with weather
+and dice of the site's own, the same for all plans (of dice that all sites share a regression would learn the luck). A
+ridge regression from the parameters to each plan's gain is fitted on seven eighths of the sites and chooses for the
+last, in turn, among all plans and among the constant ones. Leaves results/studies/site_regression.csv, a row a task and
+weight, and weight "all": scores, where 100 is one constant plan for all sites, its own for each weight.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from analysis.studies import open_loop, site_choice
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 
-SITES = 768
+SITES = 2048
 FOLDS = 8
 RIDGE = 100.0  # added to the diagonal; between 10 and 1000 the score differs by less than one
 
@@ -59,26 +59,25 @@ def predicted(parameters: np.ndarray, gains: np.ndarray) -> np.ndarray:
 
 
 def summarise(task: str, parameters: np.ndarray, gains: np.ndarray) -> list[dict]:
-    """Rows of a task with 95 % intervals over sites; gains over doing nothing, (plans, sites, 2)."""
-    one_plan, chosen = [], []  # a row a weight, a column a site
+    """Rows of a task with 95 % intervals over sites; gains over doing nothing, of PLANS first, (plans, sites, 2)."""
+    gained = []  # (weights, 3, sites): one plan for all, chosen among all, and among the constant ones
     weights = fronts.evaluation_weights(2)
     for weight in weights:
         scalarised = (weight * gains[..., 0] + (1 - weight) * gains[..., 1]).T
-        choice = predicted(parameters, scalarised).argmax(axis=1)
-        one_plan.append(scalarised[:, scalarised.mean(axis=0).argmax()])
-        chosen.append(np.take_along_axis(scalarised, choice[:, None], axis=1)[:, 0])
-    one_plan, chosen = np.array(one_plan), np.array(chosen)
+        constant = scalarised[:, : len(site_choice.PLANS)]
+        chosen = [of[np.arange(len(of)), predicted(parameters, of).argmax(axis=1)] for of in (scalarised, constant)]
+        gained.append([constant[:, constant.mean(axis=0).argmax()], *chosen])
+    gained = np.array(gained)
     sites = gains.shape[1]
     resampled = np.random.default_rng(0).integers(sites, size=(site_choice.REPETITIONS, sites))
     rows = []
-    for weight, base, mine in [
-        *zip(weights, one_plan, chosen, strict=True),
-        (site_choice.ALL, one_plan.mean(axis=0), chosen.mean(axis=0)),
-    ]:
-        drawn = 100.0 * mine[resampled].mean(axis=1) / base[resampled].mean(axis=1)
-        low, high = np.percentile(drawn, [2.5, 97.5])
-        score = 100.0 * mine.mean() / base.mean()
-        rows.append({"task": task, "weight": weight, "score": score, "score_low": low, "score_high": high})
+    for weight, (base, *mine) in [*zip(weights, gained, strict=True), (site_choice.ALL, gained.mean(axis=0))]:
+        row = {"task": task, "weight": weight}
+        for name, of in zip(("score", "score_constant"), mine, strict=True):
+            drawn = 100.0 * of[resampled].mean(axis=1) / base[resampled].mean(axis=1)
+            low, high = np.percentile(drawn, [2.5, 97.5])
+            row |= {name: 100.0 * of.mean() / base.mean(), f"{name}_low": low, f"{name}_high": high}
+        rows.append(row)
     return rows
 
 
@@ -99,7 +98,7 @@ def main(args: Args) -> None:
     others = site_choice.SITES * site_choice.DICE  # dice that site_choice.py has
     dice = {site: [others + site] for site in range(site_choice.SITES, site_choice.SITES + sites)}
     parameters = [list(sim.sample_site(open_loop.FIRST_SITE_SEED + site).values()) for site in dice]
-    plans = np.repeat(np.array(site_choice.PLANS)[:, None], years, axis=1)
+    plans = site_choice.all_plans(years)
     chunks = -(-sites * len(plans) // site_choice.CHUNK) * len(site_choice.TASKS)
     progress = protocol.Progress("site_regression", chunks, "chunks")
     rows = []
