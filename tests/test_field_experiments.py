@@ -73,8 +73,8 @@ def test_signs_of_a_made_up_table():
     words = " ".join(text.split())
     assert "(2 constants; steps" in words
     assert "deciduous trees; 0 change nothing there, so that nothing is said of them. In `balanced` zero" in words
-    assert "the effect: 1 of conifers, 0 of deciduous trees; 0 change" in words
-    assert "the effect: 0 of conifers, 1 of deciduous trees; 1 change" in words
+    assert "this mean: 1 of conifers, 0 of deciduous trees; 0 change" in words
+    assert "this mean: 0 of conifers, 1 of deciduous trees; 1 change" in words
     missed = [miss.what.split(":")[0] for miss in misses]
     assert missed == ["`a` = 1, `paper`", "`b` = 3, `paper`", "`b` = 3, `balanced`"]
 

@@ -65,7 +65,7 @@ def test_the_ground_that_no_plan_keeps():
     assert table["first"].tolist().count(2065) == 3 and set(table["last"]) == {2074, 2100}
     assert (table[["no_change", "some_plan", "no_plan", *warming.GROUND_NAMES]] == [1, 2, 1, 1, 1, 0]).all(axis=None)
     cold, _, warm = warming.answer(table, ground).splitlines()
-    assert "not by 2.8 K. Of 1 sites" in cold and "for all of them keeps 1, 1, 1." in cold
+    assert "even 2.8 K does not. Of 1 sites" in cold and "for all of them keeps 1, 1, 1." in cold
     assert "between 0.0 and 0.9 K. Of 1 sites some plan keeps 0" in warm
 
 

@@ -94,7 +94,7 @@ SENTENCES = (
         "Stems store carbon, help permafrost by the snow that they catch and harm it by what they absorb",
         "The paper says that dense stands store carbon, help permafrost by the snow that they catch (its table says "
         "the opposite) and can harm it by what they absorb; not all of it holds here",
-        "That dense stands store carbon and help permafrost by the snow that they catch, as the paper's introduction "
+        "That planted stems store carbon and help permafrost by the snow that they catch, as the paper's introduction "
         "says (its table says the opposite), holds; whether the rest of what they do harms it hangs on the wind",
         beside=mechanisms.IN_WEAK_WIND,
     ),
