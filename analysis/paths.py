@@ -36,7 +36,9 @@ def there(folder: Path) -> Path:
 
 
 def make_file_writable(flag: str, path: Path) -> None:
-    """The same of a file's folder; a flag that names a folder ends the script, too."""
+    """Make a file's folder before anything is computed; a flag that names a folder, or one that cannot be written to,
+    ends the script with one line.
+    """
     if os.path.isdir(path):
         fail(f"{flag} {path}: the name of a file is allowed")
     make_writable(flag, path.parent)

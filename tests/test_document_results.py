@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from tiny_runs import TINY_RUNS, write_run
 
-from analysis import document_results, experiments, main_points, methods, stored
+from analysis import document_results, excerpts, experiments, main_points, methods, stored
 from analysis.results import Results
 
 ROOT = Path(__file__).parents[1]
@@ -131,3 +131,12 @@ def test_the_splits_of_sites_and_the_policies_on_them(tmp_path):
     _, _, inside, outside = document_results.section(results, "generalisation").splitlines()
     assert inside == "| Group PPO, seed 2, `boreal-balanced-v0` | test | 2 | 96 | 0.80 |  | 1.00 |  |"
     assert outside.startswith("| Group PPO, seed 2, `boreal-balanced-v0` | calmer | 2 | 61 | 0.60 | 0.20 [")
+
+
+def test_misses_are_told_beside_all_that_is_judged():
+    judged = (
+        "| a | 1 (0 .. 2) in, 56 % | 3 **MISS, high**, 4 % |\n| b | 2 | in, calibrated | in |\n| in winter | 3 | - |\n"
+    )
+    missed = "| where | what |\n| --- | --- |\n| here | a |\n| sites that span the sampled | b |\n"
+    page = f"In all.\n\n{judged}\n## 9. What misses\n\n{missed}"
+    assert excerpts.of_judged(page) == "1 of 4 judged values (1 of the others calibrated)"

@@ -175,6 +175,13 @@ def test_an_effect_whose_course_is_drawn_is_told_from_none():
     assert (ends.prod(axis=1) > 0).all()
 
 
+def test_ids_that_differ_behind_a_dot_have_files_of_their_own():
+    stems = [
+        Path(many_objectives.file_stem(f"ponds:pond.{size}-v0")).with_suffix(".csv") for size in ("small", "large")
+    ]
+    assert len(set(stems)) == 2
+
+
 def test_marks_lie_within_their_axis():
     assert learning_difficulty.around(np.array([0.0, 3.0, 60.0, np.inf]), 2.0, 100.0) == (1.0, 120.0)
     assert learning_difficulty.around(np.array([50.0]), 2.0, 100.0) == (2.0, 100.0)

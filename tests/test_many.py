@@ -9,6 +9,7 @@ import pytest
 
 import boreal_env
 import sim
+from cleanrl_style.protocol import reference
 from sim.block import LANES
 from sim.region import many, store
 from sim.region.store import in_words
@@ -452,3 +453,10 @@ def test_a_grid_has_each_point_once():
         sim.sites_on_grid([60.0], [-90.0, 0.0, 270.0])
     with pytest.raises(ValueError, match=r"latitude_deg: each number once is allowed, got \[56, 56\]"):
         sim.sites_on_grid([56, 56], [1])
+
+
+def test_a_text_longer_than_a_files_name_is_no_file():
+    """A policy's docstring is a constant of its code, and an argument may be any text."""
+    text = "plants where there is room " * 12
+    assert in_words(text).startswith(repr(text)[:100])
+    assert reference.is_plain(text)

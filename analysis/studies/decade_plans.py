@@ -55,7 +55,7 @@ class Args:
 
 
 class Played:
-    """Returns of plans on sites, each plan played once."""
+    """Returns of plans on `sites` sites from number `first` on, each plan played once."""
 
     def __init__(self, task: str, first: int, sites: int, design: Design):
         self.task, self.block_years = task, design.block_years
@@ -132,9 +132,7 @@ def path(task: str, quick: bool = False) -> Path:
 
 def main(args: Args) -> None:
     """Search in the tasks and write a table of each."""
-    unknown = [task for task in args.tasks if task not in TASKS]
-    if unknown:
-        protocol.fail(f"--tasks {unknown[0]}: allowed are {', '.join(TASKS)}")
+    site_choice.check_tasks(args.tasks)
     design = Design(args.sites, args.judging, YEARS, BLOCK_YEARS)
     if args.quick:
         design = Design(sites=2, judging=2, years=2, block_years=1)

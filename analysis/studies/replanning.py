@@ -21,7 +21,7 @@ import boreal_env
 import sim
 from analysis import paths, stored
 from analysis.studies import open_loop, signal_to_noise
-from analysis.studies.site_choice import ALL, PLANS, REPETITIONS, TASKS, YEARS
+from analysis.studies.site_choice import ALL, PLANS, REPETITIONS, TASKS, YEARS, check_tasks
 from cleanrl_style import protocol
 from cleanrl_style.protocol import fronts
 
@@ -156,9 +156,7 @@ def path(task: str, quick: bool = False) -> Path:
 
 def main(args: Args) -> None:
     """Play the tasks and write a table of each."""
-    unknown = [task for task in args.tasks if task not in TASKS]
-    if unknown:
-        protocol.fail(f"--tasks {unknown[0]}: allowed are {', '.join(TASKS)}")
+    check_tasks(args.tasks)
     design = Design(args.sites, args.dice, args.futures, every=10, years=YEARS)
     if args.quick:
         design = Design(sites=2, dice=1, futures=2, every=1, years=3)

@@ -53,6 +53,13 @@ class Args:
     """2 sites, 2 dice, 3 years: to see that it runs, into results/quick/studies"""
 
 
+def check_tasks(tasks: Sequence[str]) -> None:
+    """A flag's ids of environments; one that is none of TASKS ends the script with one line."""
+    unknown = [task for task in tasks if task not in TASKS]
+    if unknown:
+        protocol.fail(f"--tasks {unknown[0]}: allowed are {', '.join(TASKS)}")
+
+
 def all_plans(years: int) -> np.ndarray:
     """Actions of PLANS, then of CHANGING, (plans, years)."""
     return np.repeat([*([plan] * 5 for plan in PLANS), *CHANGING], YEARS // 5, axis=1)[:, :years]
